@@ -1,0 +1,2 @@
+from .brdf import evaluate as evaluate
+from .brdf import model as model

@@ -1,0 +1,8 @@
+"""Reflectance models: one model, one file, one page of manual."""
+
+from fitmat.brdf.base import AbstractBRDF as AbstractBRDF
+from fitmat.brdf.base import evaluate as evaluate
+from fitmat.brdf.base import evaluate_pairs as evaluate_pairs
+from fitmat.brdf.registry import LOBES as LOBES
+from fitmat.brdf.registry import lobe_names as lobe_names
+from fitmat.brdf.registry import model as model

@@ -1,0 +1,92 @@
+"""What a BRDF is: a frozen module written for one pair of directions, and the one place that maps it over many.
+
+No formula of any material stands here.
+"""
+
+from abc import abstractmethod
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import ArrayLike, Float
+
+from fitmat._types import Directions, Samples, Scalar, Spectrum, Vec3
+from fitmat.errors import ModelError
+
+
+class AbstractBRDF(eqx.Module):
+    """A reflectance model; its `param` fields are what can be fitted."""
+
+    name: eqx.AbstractVar[str]
+
+    @abstractmethod
+    def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
+        """f_r in sr⁻¹, without cosine; 0 where a direction is not above the surface.
+
+        Args:
+            wi: Unit vector to the light, local frame (n = +z).
+            wo: Unit vector to the sensor.
+        """
+
+    @abstractmethod
+    def width(self) -> Scalar:
+        """Slope-like width of the narrowest lobe, in (0, 1]: what a quadrature over directions must resolve."""
+
+
+class Sum(AbstractBRDF):
+    """The sum of lobes, each with its own parameters; usually one diffuse and one specular lobe."""
+
+    lobes: tuple[AbstractBRDF, ...]
+
+    @property
+    def name(self) -> str:
+        """The lobes' names joined by "+"."""
+        return "+".join(lobe.name for lobe in self.lobes)
+
+    def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
+        """Σ f_k(ω_i, ω_o)."""
+        return sum((lobe(wi, wo) for lobe in self.lobes[1:]), self.lobes[0](wi, wo))
+
+    def width(self) -> Scalar:
+        """That of the narrowest lobe."""
+        return jnp.min(jnp.stack([lobe.width() for lobe in self.lobes]))
+
+
+def evaluate_pairs(model: AbstractBRDF, wi: Directions, wo: Directions) -> Samples:
+    """The model over n pairs, without checks; traceable by JAX."""
+    return jax.vmap(lambda a, b: jnp.atleast_1d(model(a, b)))(wi, wo)
+
+
+def evaluate(model: AbstractBRDF, wi: ArrayLike, wo: ArrayLike) -> Float[np.ndarray, "n c"]:
+    """BRDF values in sr⁻¹ (no cosine) for n pairs of directions.
+
+    Args:
+        model: From `fitmat.model`.
+        wi: Unit vectors to the light, (n, 3), local frame with the normal +z.
+        wo: Unit vectors to the sensor, (n, 3).
+
+    Returns:
+        Values (n, c), one column per channel; 0 where a direction is below the horizon.
+
+    Raises:
+        ModelError: the shapes differ or the vectors are not of unit length.
+
+    Example:
+        >>> import fitmat as fm, numpy as np
+        >>> up = np.array([[0.0, 0.0, 1.0]])
+        >>> fm.evaluate(fm.model("lambert", kd=np.pi / 4), up, up)
+        array([[0.25]])
+    """
+    pair = [np.asarray(w, float) for w in (wi, wo)]
+    if pair[0].shape != pair[1].shape or pair[0].ndim != 2 or pair[0].shape[1] != 3:
+        raise ModelError(f"wi and wo have shapes {pair[0].shape} and {pair[1].shape}: expected the same (n, 3).")
+    for label, w in zip(("wi", "wo"), pair, strict=True):
+        length = np.linalg.norm(w, axis=1)
+        if not np.allclose(length, 1.0, atol=1e-6):
+            row = int(np.argmax(np.abs(length - 1.0)))
+            raise ModelError(f"{label} row {row} has length {length[row]:.6g}: expected unit vectors.")
+    return np.asarray(_evaluate_jit(model, pair[0], pair[1]))
+
+
+_evaluate_jit = eqx.filter_jit(evaluate_pairs)

@@ -1,0 +1,77 @@
+"""Directions: angles ↔ unit vectors, the half vector, and what counts as above the surface.
+
+Conventions, the same everywhere in fitmat:
+
+====================  =====================================================================================
+frame                 local, surface normal n = +z
+wi, wo                unit vectors, both pointing **away** from the surface: to the light, to the sensor
+BRDF value            f_r in sr⁻¹, **without** the cosine
+theta                 zenith angle from the normal, 0 to π/2 (radians inside, degrees in files and flags)
+phi                   relative azimuth φ_o − φ_i; the mirror direction of theta_i is theta_o = theta_i, φ = π
+signed theta_o        in-plane files: positive = forward, the mirror side (φ = π); negative = backward (φ = 0)
+eta                   index of refraction, transmitted over incident
+alpha                 slope parameter of the microfacet distribution (never "roughness")
+wavelength            nm
+numbers               float64
+====================  =====================================================================================
+
+Nothing here knows about reflectance.
+"""
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from fitmat._types import Scalar, Vec3
+
+COS_MIN = 1e-7
+"""Cosines are floored here where a formula divides by them; an angle of 6·10⁻⁶ degrees from grazing."""
+
+_TINY = 1e-300
+
+
+def from_angles(theta: np.ndarray, phi: np.ndarray) -> Float[np.ndarray, "n 3"]:
+    """Zenith and azimuth angles in radians, shape (n,), to unit vectors (n, 3)."""
+    sin = np.sin(theta)
+    return np.stack([sin * np.cos(phi), sin * np.sin(phi), np.cos(theta)], axis=-1)
+
+
+def zenith(directions: np.ndarray) -> Float[np.ndarray, " n"]:
+    """Zenith angles in radians of unit vectors (n, 3), exact near the normal as well."""
+    return np.arctan2(np.hypot(directions[..., 0], directions[..., 1]), directions[..., 2])
+
+
+def relative_azimuth(wi: np.ndarray, wo: np.ndarray) -> Float[np.ndarray, " n"]:
+    """φ_o − φ_i in radians, folded to [0, π] (isotropic surfaces look the same on both sides)."""
+    difference = np.arctan2(wo[:, 1], wo[:, 0]) - np.arctan2(wi[:, 1], wi[:, 0])
+    return np.abs((difference + np.pi) % (2 * np.pi) - np.pi)
+
+
+def signed_zenith(wi: np.ndarray, wo: np.ndarray) -> Float[np.ndarray, " n"]:
+    """theta_o in radians, positive on the mirror side of the normal, for plots of in-plane curves."""
+    forward = relative_azimuth(wi, wo) > np.pi / 2
+    return np.where(forward, 1.0, -1.0) * zenith(wo)
+
+
+def half_vector(wi: Vec3, wo: Vec3) -> Vec3:
+    """h = (ω_i + ω_o)/|ω_i + ω_o|; the normal where the sum vanishes (ω_i = −ω_o)."""
+    total = wi + wo
+    square = total @ total
+    usable = square > 1e-24
+    safe = jnp.where(usable, square, 1.0)
+    return jnp.where(usable, total / jnp.sqrt(safe), jnp.array([0.0, 0.0, 1.0]))
+
+
+def cos_difference(wi: Vec3, wo: Vec3) -> Scalar:
+    """c_d = ω_i·h = √((1 + ω_i·ω_o)/2), in [0, 1]."""
+    return jnp.sqrt(jnp.clip((1.0 + wi @ wo) / 2.0, _TINY, 1.0))
+
+
+def mirror(direction: Vec3) -> Vec3:
+    """The mirror direction 2(n·ω)n − ω."""
+    return direction * jnp.array([-1.0, -1.0, 1.0])
+
+
+def above(wi: Vec3, wo: Vec3) -> Bool[Array, ""]:
+    """True where both directions are above the surface; every BRDF is 0 elsewhere."""
+    return (wi[2] > 0.0) & (wo[2] > 0.0)

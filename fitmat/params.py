@@ -1,0 +1,203 @@
+"""Parameters of a model: bounds, unit, symbol and scale in one place, and the change of variables that keeps them.
+
+This room knows nothing of reflection and fits nothing.
+"""
+
+import dataclasses
+from typing import Any, Literal, TypeVar
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, Float
+
+from fitmat.errors import ModelError
+
+M = TypeVar("M", bound=eqx.Module)
+
+EDGE = 1e-3
+"""Starts are kept this fraction of the free range (in sine coordinates) away from a bound."""
+
+AT_BOUND = 1e-6
+"""A coordinate closer to its bound than this fraction of its range counts as at the bound."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Param:
+    """What is known of a parameter before any data.
+
+    Attributes:
+        lower: Smallest allowed value.
+        upper: Largest allowed value.
+        symbol: The letter of the literature.
+        unit: Unit, "1" for none.
+        scale: "log" where equal ratios matter (widths, exponents), else "linear".
+        per_channel: One value per channel when fitted to several channels, else shared.
+        weight: True where the BRDF is proportional to it (kd, ks): solved linearly in the start grid.
+        starts: Values tried in the start grid; empty for weights.
+        doc: What it means, in a few words.
+    """
+
+    lower: float
+    upper: float
+    symbol: str
+    unit: str
+    scale: Literal["linear", "log"]
+    per_channel: bool
+    weight: bool
+    starts: tuple[float, ...]
+    doc: str
+
+
+def param(
+    lower: float,
+    upper: float,
+    *,
+    symbol: str,
+    doc: str,
+    unit: str = "1",
+    scale: Literal["linear", "log"] = "linear",
+    per_channel: bool = False,
+    weight: bool = False,
+    starts: tuple[float, ...] = (),
+    default: float | None = None,
+) -> Any:
+    """Declare a model field as a parameter; see `Param` for the arguments."""
+    meta = Param(lower, upper, symbol, unit, scale, per_channel, weight, starts, doc)
+    extra = {} if default is None else {"default": default}
+    return eqx.field(converter=as_parameter, metadata={"param": meta}, **extra)
+
+
+def as_parameter(value: Any) -> Array:
+    """A number, or one number per channel, as a floating-point array."""
+    if value is None or isinstance(value, str | bytes | bool):
+        raise ModelError(f"parameter value {value!r}: expected a number or one number per channel.")
+    return jnp.asarray(value, float)
+
+
+@dataclasses.dataclass(frozen=True)
+class Entry:
+    """A named parameter of one model, with its place in the model's parameter vector."""
+
+    name: str
+    param: Param
+    place: slice
+    shape: tuple[int, ...]
+
+    @property
+    def size(self) -> int:
+        """How many numbers it holds: 1, or one per channel."""
+        return self.place.stop - self.place.start
+
+
+def _walk(module: Any, owner: str) -> list[tuple[str, str, Param, tuple[int, ...]]]:
+    found = []
+    for field in dataclasses.fields(module):
+        value = getattr(module, field.name)
+        if "param" in field.metadata:
+            found.append((owner, field.name, field.metadata["param"], np.shape(value)))
+        elif isinstance(value, tuple):
+            for part in value:
+                found += _walk(part, getattr(part, "name", owner))
+        elif isinstance(value, eqx.Module):
+            found += _walk(value, owner)
+    return found
+
+
+def entries(model: eqx.Module) -> tuple[Entry, ...]:
+    """The model's parameters in the order of its vector (`vector(model)`).
+
+    A name that two lobes share is written with its lobe: `phong.ks`, `ggx.ks`.
+    """
+    found = _walk(model, "")
+    names = [name for _, name, _, _ in found]
+    result, start = [], 0
+    for owner, name, meta, shape in found:
+        unique = name if names.count(name) == 1 else f"{owner}.{name}"
+        stop = start + int(np.prod(shape, dtype=int))
+        result.append(Entry(unique, meta, slice(start, stop), tuple(shape)))
+        start = stop
+    return tuple(result)
+
+
+def vector(model: eqx.Module) -> Float[Array, " p"]:
+    """All parameter values as one vector, physical units."""
+    return ravel_pytree(model)[0]
+
+
+def with_vector(model: M, values: Float[Array, " p"]) -> M:
+    """The same model with the parameter values of `values`, the inverse of `vector`."""
+    return ravel_pytree(model)[1](values)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Space:
+    """Coordinates of a parameter vector: physical ↔ natural (log where the scale is log) ↔ free (unbounded).
+
+    The free coordinate is MINUIT's sine, x = lower + (upper − lower)(1 + sin u)/2 (James & Roos 1975), in the
+    natural coordinate: unlike a sigmoid it reaches a bound at finite u, so that a solver can stop there.
+    """
+
+    lower: Float[np.ndarray, " p"]
+    upper: Float[np.ndarray, " p"]
+    log: np.ndarray
+
+    def natural(self, values: Array) -> Array:
+        """Physical → natural: the logarithm where the scale is log."""
+        return jnp.where(self.log, jnp.log(jnp.where(self.log, values, 1.0)), values)
+
+    def physical(self, natural: Array) -> Array:
+        """Natural → physical."""
+        return jnp.where(self.log, jnp.exp(jnp.where(self.log, natural, 0.0)), natural)
+
+    @property
+    def natural_lower(self) -> np.ndarray:
+        """Lower bounds, natural."""
+        return np.where(self.log, np.log(np.where(self.log, self.lower, 1.0)), self.lower)
+
+    @property
+    def natural_upper(self) -> np.ndarray:
+        """Upper bounds, natural."""
+        return np.where(self.log, np.log(np.where(self.log, self.upper, 1.0)), self.upper)
+
+    def to_free(self, values: Array) -> Array:
+        """Physical → free; values on or outside a bound are nudged inside."""
+        span = self.natural_upper - self.natural_lower
+        t = 2.0 * (self.natural(values) - self.natural_lower) / span - 1.0
+        return jnp.arcsin(jnp.clip(t, -np.cos(EDGE), np.cos(EDGE)))
+
+    def from_free(self, free: Array) -> Array:
+        """Free → physical, always within the bounds."""
+        span = self.natural_upper - self.natural_lower
+        return self.physical(self.natural_lower + span * (1.0 + jnp.sin(free)) / 2.0)
+
+    def at_bound(self, values: np.ndarray) -> np.ndarray:
+        """Which physical values sit on a bound: −1 lower, +1 upper, 0 inside."""
+        span = self.natural_upper - self.natural_lower
+        t = (np.asarray(self.natural(jnp.asarray(values))) - self.natural_lower) / span
+        return np.where(t < AT_BOUND, -1, np.where(t > 1.0 - AT_BOUND, 1, 0))
+
+
+def space(model: eqx.Module) -> Space:
+    """The coordinates of the model's parameter vector."""
+    every = entries(model)
+    spread = [(e.param.lower, e.param.upper, e.param.scale == "log") for e in every for _ in range(e.size)]
+    lower, upper, log = (np.array(column) for column in zip(*spread, strict=True))
+    return Space(lower, upper, log)
+
+
+def check_range(model: eqx.Module) -> None:
+    """Refuse parameter values outside their bounds.
+
+    Raises:
+        ModelError: names the parameter, the value and its range.
+    """
+    values = np.asarray(vector(model))
+    for entry in entries(model):
+        part, p = values[entry.place], entry.param
+        bad = part[~((part >= p.lower) & (part <= p.upper))]
+        if bad.size:
+            raise ModelError(
+                f"parameter {entry.name} = {bad[0]:g}: expected a value from {p.lower:g} to {p.upper:g}."
+            )
