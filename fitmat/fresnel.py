@@ -93,7 +93,7 @@ def dielectric(cos_d: Scalar, eta: Spectrum) -> Spectrum:
     Cook & Torrance 1982, eq. 15 with the square root of the original (some course slides drop it).
     """
     c = cos_d
-    square = eta**2 + c**2 - 1.0
+    square = (eta - 1.0) * (eta + 1.0) + c**2  # η² + c² − 1 without its cancellation near η = 1
     total = square <= 0.0
     g = jnp.sqrt(jnp.where(total, 1.0, square))
     first = (g - c) / (g + c)

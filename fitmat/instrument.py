@@ -1,0 +1,144 @@
+"""The instrument's noise, estimated from the scatter of repeats and of neighbouring angles.
+
+The estimate looks at the data only, never at a model.
+"""
+
+import dataclasses
+
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import minimize
+
+from fitmat.measurement import Measurements
+
+MIN_RESIDUALS = 12
+"""Fewer neighbour comparisons than this say nothing about the noise."""
+
+UNKNOWN_RELATIVE = 1e-3
+"""Placeholder noise where none can be estimated: small, so that the inferred discrepancy takes its place."""
+
+_T_DOF = 4.0
+# Scale of a t distribution with 4 degrees of freedom that fits Gaussian data best: the root s of
+# E[5 x²/(4 s² + x²)] = 1 for x ~ N(0, 1).
+_T_SCALE = 0.8310
+
+
+@dataclasses.dataclass(frozen=True)
+class Noise:
+    """Measurement noise σ² = a² + (b f)².
+
+    Attributes:
+        sigma: Standard deviation per sample and channel in sr⁻¹, (n, c).
+        known: False where nothing could be said and `sigma` is a placeholder.
+        words: One sentence for the report.
+    """
+
+    sigma: Float[np.ndarray, "n c"]
+    known: bool
+    words: str
+
+
+def noise(m: Measurements) -> Noise:
+    """The given σ, or an estimate per channel from repeats and neighbouring angles.
+
+    Neighbours: each sample is predicted from two neighbours on either side in its own curve (same incidence, same
+    azimuth) by cubic interpolation in asinh(f/median), which is linear for the floor and logarithmic in the peak;
+    the leave-one-out errors give a and b by a Student-t likelihood, so that a few badly predicted peak samples do
+    not count. σ is evaluated at the prediction, not at the sample itself: weights that depend on the sample's own
+    noise bias every fit.
+    """
+    if m.sigma is not None:
+        return Noise(np.where(m.valid, m.sigma, 1.0), True, "Measurement noise as given in the file.")
+    sigma, words = np.ones_like(m.value), []
+    for k, channel in enumerate(m.channels):
+        level, error, factor = _leave_one_out(m, k)
+        used = np.isfinite(error)
+        smooth = np.where(np.isfinite(level), np.abs(level), np.abs(m.value[:, k]))
+        if used.sum() < MIN_RESIDUALS:
+            top = float(np.max(np.abs(m.value[m.valid[:, k], k]), initial=0.0))
+            sigma[:, k] = UNKNOWN_RELATIVE * np.maximum(smooth, UNKNOWN_RELATIVE * max(top, 1e-12))
+            words.append("")
+            continue
+        a, b = _components(error[used], smooth[used], factor[used])
+        sigma[:, k] = np.hypot(a, b * smooth)
+        named = f" ({channel})" if len(m.channels) > 1 else ""
+        words.append(f"{100 * b:.2g} % + {a:.2g} sr⁻¹{named}")
+    if not all(words):
+        return Noise(
+            sigma,
+            False,
+            "Noise unknown: too few repeats or neighbouring angles; all scatter is counted as model misfit.",
+        )
+    return Noise(sigma, True, f"Noise estimated from neighbouring angles: {'; '.join(words)}.")
+
+
+def _curves(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Valid rows sorted by curve and angle: their indices, their curve's number, the angle along the curve."""
+    rows = np.flatnonzero(m.valid[:, channel])
+    theta_o = np.where(m.in_plane, m.signed_theta_o, m.theta_o)[rows]
+    plane = np.where(m.in_plane, 0.0, np.round(np.rad2deg(m.phi), 2))[rows]
+    keys = np.stack([np.round(np.rad2deg(m.theta_i[rows]), 2), plane], axis=1)
+    curve = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)
+    order = np.lexsort((theta_o, curve))
+    return rows[order], curve[order], theta_o[order]
+
+
+def _leave_one_out(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Per row: the level predicted without it, its error, and the variance of that error in units of σ².
+
+    NaN where a row has neither repeats nor two neighbours on either side.
+    """
+    level, error, factor = (np.full(m.n_samples, np.nan) for _ in range(3))
+    rows, curve, x = _curves(m, channel)
+    if len(rows) == 0:
+        return level, error, factor
+    y = m.value[rows, channel]
+    new = np.r_[True, (np.diff(curve) != 0) | (np.diff(x) > 1e-6)]
+    group = np.cumsum(new) - 1
+    count = np.bincount(group)
+    mean = np.bincount(group, y) / count
+    repeated = count[group] > 1
+    error[rows[repeated]] = (y - mean[group])[repeated]
+    factor[rows[repeated]] = (1.0 - 1.0 / count[group])[repeated]
+    level[rows[repeated]] = mean[group][repeated]
+    x, curve = x[new], curve[new]
+    inner = np.arange(2, len(x) - 2)
+    inner = inner[(curve[inner - 2] == curve[inner + 2])] if len(x) > 4 else inner[:0]
+    near = inner[:, None] + np.array([-2, -1, 1, 2])
+    scale = np.median(np.abs(y)) or 1.0
+    weights = _lagrange(x[near], x[inner])
+    predicted = scale * np.sinh((weights * np.arcsinh(mean[near] / scale)).sum(axis=1))
+    single = count[inner] == 1
+    at = rows[np.flatnonzero(new)[inner[single]]]
+    level[at], error[at] = predicted[single], (mean[inner] - predicted)[single]
+    factor[at] = (1.0 + (weights**2 / count[near]).sum(axis=1))[single]
+    return level, error, factor
+
+
+def _lagrange(nodes: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Weights of the cubic through four nodes (m, 4), evaluated at (m,)."""
+    others = [[j for j in range(4) if j != k] for k in range(4)]
+    return np.stack(
+        [
+            np.prod((at[:, None] - nodes[:, o]) / (nodes[:, [k]] - nodes[:, o]), axis=1)
+            for k, o in enumerate(others)
+        ],
+        axis=1,
+    )
+
+
+def _components(error: np.ndarray, level: np.ndarray, factor: np.ndarray) -> tuple[float, float]:
+    """a (sr⁻¹) and b (relative) of σ² = a² + (b f)² by maximum likelihood under a t distribution."""
+    typical = np.median(np.abs(error)) / 0.6745 + 1e-300
+    relative = np.median(np.abs(error) / np.maximum(level, 1e-300)) / 0.6745 + 1e-12
+
+    def cost(logs: np.ndarray) -> float:
+        a, b = np.exp(logs)
+        scale = _T_SCALE * np.sqrt(factor * (a**2 + (b * level) ** 2))
+        t = (_T_DOF + 1.0) / 2.0 * np.log1p((error / scale) ** 2 / _T_DOF)
+        return float(np.sum(t + np.log(scale)))
+
+    starts = [np.log([typical * p, relative * q]) for p, q in ((0.7, 0.7), (0.02, 1.0), (1.0, 0.02))]
+    best = min((minimize(cost, s, method="Nelder-Mead") for s in starts), key=lambda result: result.fun)
+    a, b = np.exp(best.x)
+    return float(a), float(b)
