@@ -77,6 +77,7 @@ class Fit:
         n_starts: How many starts were refined.
         n_starts_agreeing: How many of them found the best optimum.
         log_likelihood: At the optimum.
+        information: JᵀJ of the residuals in natural coordinates (logarithm where the scale is log), (p, p).
         covariance: Of all physical parameters, (p, p); 0 for fixed ones, NaN for those on a bound.
         undetermined: Names of parameters that these data do not determine.
     """
@@ -93,6 +94,7 @@ class Fit:
     n_starts: int
     n_starts_agreeing: int
     log_likelihood: float
+    information: Float[np.ndarray, "p p"]
     covariance: Float[np.ndarray, "p p"]
     undetermined: tuple[str, ...]
 
@@ -281,10 +283,9 @@ def _conclude(
     free = free_places(template, held)
     bounds = space(template).at_bound(ends.values[k])
     inside = np.array([j for j in free if bounds[j] == 0], int)
-    if usable[k]:
-        covariance, undetermined = _uncertainty(best, data, s, inside)
-    else:
-        covariance, undetermined = np.full((len(bounds),) * 2, np.nan), ()
+    jacobian = np.asarray(_natural_jacobian(best, data, jnp.asarray(s)))
+    information = jacobian.T @ jacobian
+    covariance, undetermined = _uncertainty(best, information, inside)
     return Fit(
         name=template.name,
         model=best,
@@ -298,6 +299,7 @@ def _conclude(
         n_starts=len(scores),
         n_starts_agreeing=int(np.count_nonzero(scores > scores[k] - AGREE)) if usable[k] else 0,
         log_likelihood=float(ends.log_likelihood[k]),
+        information=information,
         covariance=covariance,
         undetermined=undetermined,
     )
@@ -324,25 +326,29 @@ def _natural_jacobian(best: AbstractBRDF, data: Data, s: Array) -> Array:
     return jax.jacfwd(residual)(coordinates.natural(vector(best)))
 
 
-def _uncertainty(
-    best: AbstractBRDF, data: Data, s: float, inside: np.ndarray
-) -> tuple[Float[np.ndarray, "p p"], tuple[str, ...]]:
-    """Covariance (JᵀJ)⁻¹ in physical parameters from the singular values of J, and what is not determined.
+def inverse_information(information: np.ndarray, span: np.ndarray) -> np.ndarray:
+    """The inverse of an information matrix, huge but finite along directions that the data do not determine.
 
-    J is taken in natural coordinates, scaled to the widths of the bounds; singular values below 1e-9 of the
-    largest are raised to it, so that an undetermined direction gives a huge but finite variance.
+    Args:
+        information: JᵀJ, (k, k), natural coordinates.
+        span: Widths of the bounds in the same coordinates, (k,); they set the scale of "huge".
     """
-    coordinates = space(best)
-    values = np.asarray(vector(best))
+    scaled = np.nan_to_num(information * np.outer(span, span))
+    eigenvalues, vectors = np.linalg.eigh(scaled)
+    floor = max(1e-14 * float(eigenvalues.max(initial=0.0)), 1e-12)
+    return (vectors / np.maximum(eigenvalues, floor)) @ vectors.T * np.outer(span, span)
+
+
+def _uncertainty(
+    best: AbstractBRDF, information: np.ndarray, inside: np.ndarray
+) -> tuple[Float[np.ndarray, "p p"], tuple[str, ...]]:
+    """Covariance (JᵀJ)⁻¹ in physical parameters, and what is not determined."""
+    coordinates, values = space(best), np.asarray(vector(best))
     span = coordinates.natural_upper - coordinates.natural_lower
-    jacobian = np.asarray(_natural_jacobian(best, data, jnp.asarray(s)))[:, inside] * span[inside]
-    _, singular, vt = np.linalg.svd(np.linalg.qr(jacobian, mode="r"))
-    floor = max(1e-9 * float(singular.max(initial=0.0)), 1e-12)
-    root = vt.T / np.maximum(singular, floor)
-    natural = (root @ root.T) * np.outer(span[inside], span[inside])
+    natural = inverse_information(information[np.ix_(inside, inside)], span[inside])
     sd = np.sqrt(np.diagonal(natural))
     limit = np.where(coordinates.log, UNDETERMINED["log"], UNDETERMINED["linear"] * span)[inside]
-    loose = set(inside[sd > limit])
+    loose = set(inside[~(sd <= limit)])
     slope = np.where(coordinates.log, values, 1.0)[inside]
     covariance = np.zeros((len(values), len(values)))
     covariance[np.ix_(inside, inside)] = natural * np.outer(slope, slope)

@@ -141,9 +141,11 @@ def from_arrays(
     if sigma is not None:
         sigma = np.broadcast_to(np.atleast_2d(np.asarray(sigma, float).T).T, value.shape)
     channels = channels or default_channels(value.shape[1])
+    placed = np.isfinite(theta_i) & np.isfinite(theta_o) & np.isfinite(phi)
+    theta_i, theta_o, phi = (np.where(placed, angle, 0.0) for angle in (theta_i, theta_o, phi))
     phi = np.where(theta_o < 0, phi + np.pi, phi)
     wi, wo = from_angles(theta_i, np.zeros_like(phi)), from_angles(np.abs(theta_o), phi)
-    valid = np.isfinite(value) & ((wi[:, 2] > 0) & (wo[:, 2] > 0))[:, None]
+    valid = np.isfinite(value) & (placed & (wi[:, 2] > 0) & (wo[:, 2] > 0))[:, None]
     if sigma is not None:
         valid = valid & np.isfinite(sigma) & (sigma > 0)
     masked = {"not finite, no positive sigma, or below the horizon": int((~valid.all(1)).sum())}

@@ -1,0 +1,273 @@
+"""The match: how closely an empirical model reproduces a microfacet model fitted to the same measurements.
+
+Judges two fits; draws nothing and prints nothing.
+"""
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from fitmat.brdf import AbstractBRDF, evaluate
+from fitmat.energy import directional_albedo, incidence, incidence_rule, lobe_rule
+from fitmat.errors import FitmatError
+from fitmat.fitting import Fit
+from fitmat.measurement import Measurements
+from fitmat.params import with_vector
+from fitmat.uncertainty import Posterior
+
+DRAWS = 200
+"""Posterior draws behind every interval of the match."""
+
+ALBEDO_ANGLES = np.deg2rad(np.arange(0.0, 86.0, 5.0))
+"""Incidence angles of the albedo curves, radians."""
+
+EMPIRICAL = ("phong", "blinn-phong", "blinn-phong-exact")
+"""Lobes that the match calls empirical; lobes with a Fresnel term are microfacet lobes."""
+
+CLOSE, SIMILAR = 0.1, 0.3
+"""Hemisphere distances up to which the verdict says "hardly differ" and "differ moderately"."""
+
+STRONG_EVIDENCE = 10.0
+"""ΔBIC from which the data clearly prefer one model (Kass & Raftery 1995: "very strong")."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Estimate:
+    """A number with its 95 % posterior interval.
+
+    Attributes:
+        value: At the two best fits.
+        ci95: 2.5 % and 97.5 % quantiles over posterior draws.
+    """
+
+    value: float
+    ci95: tuple[float, float]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Comparison:
+    """The match of two fits.
+
+    Attributes:
+        empirical: Posterior of the empirical model.
+        microfacet: Posterior of the microfacet model.
+        hemisphere_distance: √(∫∫(f_P − f_M)² c_i c_o / ∫∫ f_M² c_i c_o), over all pairs of directions.
+        cube_root_distance: √(mean (∛(f_P c_i) − ∛(f_M c_i))²) over solid angle, in sr^(−1/3).
+        albedo_gap_max: Largest |ρ_P − ρ_M| over incidence (channel mean), 0 to 85°.
+        albedo_gap_sign: −1 where the empirical model reflects less there, else +1.
+        albedo_gap_theta_i_deg: Where it occurs.
+        implied_exponent: 2/α² − 2 of the microfacet lobe; None for lobes without alpha.
+        fitted_exponent: Of the empirical lobe; None for lobes without exponent.
+        delta_aicc: AICc of the empirical minus that of the microfacet fit; positive favours microfacet.
+        delta_bic: The same for BIC.
+        albedo_theta_i: Angles of the albedo curves, radians, (k,).
+        albedo_empirical: Channel-mean directional albedo, rows low, best, high (95 %), (3, k).
+        albedo_microfacet: The same.
+    """
+
+    empirical: Posterior
+    microfacet: Posterior
+    hemisphere_distance: Estimate
+    cube_root_distance: Estimate
+    albedo_gap_max: Estimate
+    albedo_gap_sign: int
+    albedo_gap_theta_i_deg: float
+    implied_exponent: Estimate | None
+    fitted_exponent: Estimate | None
+    delta_aicc: float
+    delta_bic: float
+    albedo_theta_i: np.ndarray
+    albedo_empirical: Float[np.ndarray, "3 k"]
+    albedo_microfacet: Float[np.ndarray, "3 k"]
+
+    @property
+    def verdict(self) -> str:
+        """The match in plain sentences; thresholds are `CLOSE`, `SIMILAR` and `STRONG_EVIDENCE`."""
+        names = _lobe_title(self.empirical.fit.name), _lobe_title(self.microfacet.fit.name)
+        distance = self.hemisphere_distance
+        word = (
+            "hardly differ"
+            if distance.ci95[1] < CLOSE
+            else "differ moderately"
+            if distance.ci95[1] < SIMILAR
+            else "differ strongly"
+        )
+        low, high = (100 * x for x in distance.ci95)
+        gap, side = self.albedo_gap_max, "less" if self.albedo_gap_sign < 0 else "more"
+        sentences = [
+            f"{names[0]} and {names[1]} {word}: {100 * distance.value:.0f} % apart over the hemisphere "
+            f"(95 % interval {low:.0f}–{high:.0f} %).",
+            f"At {self.albedo_gap_theta_i_deg:.0f}° incidence {names[0]} reflects {100 * gap.value:.1f} % of the light "
+            f"{side} than {names[1]} ({100 * gap.ci95[0]:.1f}–{100 * gap.ci95[1]:.1f} %).",
+            _evidence(self.delta_bic, names),
+            f"{names[0]} {self.empirical.fit.adequacy}; {names[1]} {self.microfacet.fit.adequacy}.",
+        ]
+        unsure = [p.fit for p in (self.empirical, self.microfacet) if p.fit.result in ("max_steps", "nonfinite")]
+        sentences += [f"Do not rely on this match: the fit of {f.name} ended {f.result}." for f in unsure]
+        return " ".join(sentences)
+
+    def _repr_html_(self) -> str:
+        return f"<p>{self.verdict}</p>"
+
+
+def _lobe_title(name: str) -> str:
+    return name.removeprefix("lambert+")
+
+
+def _evidence(delta_bic: float, names: tuple[str, str]) -> str:
+    if abs(delta_bic) < STRONG_EVIDENCE:
+        return f"The data do not decide between them (ΔBIC {delta_bic:.0f})."
+    return f"The data clearly prefer {names[1] if delta_bic > 0 else names[0]} (ΔBIC {abs(delta_bic):.0f})."
+
+
+def is_empirical(name: str) -> bool:
+    """Whether a model name has an empirical specular lobe."""
+    return any(part in EMPIRICAL for part in name.split("+"))
+
+
+def is_microfacet(name: str) -> bool:
+    """Whether a model name has a microfacet lobe."""
+    return any(part.startswith(("ggx", "beckmann", "cook-torrance")) for part in name.split("+"))
+
+
+def compare(one: Posterior, other: Posterior) -> Comparison:
+    """The match between an empirical and a microfacet model, in either order.
+
+    Args:
+        one: Posterior (`laplace` or `sample`) of a fit.
+        other: Posterior of the other fit to the same measurements.
+
+    Returns:
+        A `Comparison`; intervals come from independent draws of both posteriors.
+
+    Raises:
+        FitmatError: the two are not one empirical and one microfacet model, or were fitted to different data.
+    """
+    empirical, microfacet = (one, other) if is_empirical(one.fit.name) else (other, one)
+    if not (is_empirical(empirical.fit.name) and is_microfacet(microfacet.fit.name)):
+        raise FitmatError(
+            f"compare needs one empirical ({', '.join(EMPIRICAL)}) and one microfacet model, "
+            f"got {one.fit.name} and {other.fit.name}."
+        )
+    if one.fit.measurements is not other.fit.measurements:
+        raise FitmatError("compare needs two fits to the same Measurements object.")
+    fits = empirical.fit, microfacet.fit
+    draws = [np.vstack([p.fit.values, p.thinned(DRAWS)[0]]) for p in (empirical, microfacet)]
+    count = min(len(d) for d in draws)
+    hemisphere, cube, albedo_p, albedo_m = (
+        np.asarray(part)
+        for part in _distances(fits[0].model, fits[1].model, *(jnp.asarray(d[:count]) for d in draws))
+    )
+    gaps = albedo_p - albedo_m
+    worst = int(np.argmax(np.abs(gaps[0])))
+    return Comparison(
+        empirical=empirical,
+        microfacet=microfacet,
+        hemisphere_distance=_estimate(hemisphere),
+        cube_root_distance=_estimate(cube),
+        albedo_gap_max=_estimate(np.abs(gaps).max(axis=1)),
+        albedo_gap_sign=int(np.sign(gaps[0, worst])) or 1,
+        albedo_gap_theta_i_deg=float(np.rad2deg(ALBEDO_ANGLES[worst])),
+        implied_exponent=_parameter(microfacet, "alpha", lambda alpha: 2.0 / alpha**2 - 2.0),
+        fitted_exponent=_parameter(empirical, "exponent", lambda n: n),
+        delta_aicc=fits[0].aicc - fits[1].aicc,
+        delta_bic=fits[0].bic - fits[1].bic,
+        albedo_theta_i=ALBEDO_ANGLES,
+        albedo_empirical=_band(albedo_p),
+        albedo_microfacet=_band(albedo_m),
+    )
+
+
+def _estimate(values: np.ndarray) -> Estimate:
+    """The first entry with the quantiles of the others."""
+    low, high = np.quantile(values[1:], [0.025, 0.975])
+    return Estimate(float(values[0]), (float(low), float(high)))
+
+
+def _band(curves: np.ndarray) -> np.ndarray:
+    low, high = np.quantile(curves[1:], [0.025, 0.975], axis=0)
+    return np.stack([low, curves[0], high])
+
+
+def _parameter(posterior: Posterior, name: str, of) -> Estimate | None:
+    place = next((e.place for e in posterior.fit.entries if e.name == name), None)
+    if place is None:
+        return None
+    return _estimate(of(np.r_[posterior.fit.values[place], posterior.values[:, place].ravel()]))
+
+
+@eqx.filter_jit
+def _distances(
+    empirical: AbstractBRDF, microfacet: AbstractBRDF, values_p: Array, values_m: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Hemisphere and cube-root distance (d,) and channel-mean albedos (d, k) of d pairs of draws."""
+    theta, weight_i = incidence_rule()
+
+    def at(theta_i: Array, p: AbstractBRDF, m: AbstractBRDF) -> tuple[Array, Array, Array, Array]:
+        wi, rule = incidence(theta_i), lobe_rule(theta_i, jnp.minimum(p.width(), m.width()))
+        f_p, f_m = (jax.vmap(lambda wo, f=f: jnp.atleast_1d(f(wi, wo)))(rule.wo) for f in (p, m))
+        solid = jnp.where(rule.weight > 0, rule.weight / jnp.maximum(rule.wo[:, 2], 1e-12), 0.0)
+        roots = (jnp.cbrt(f_p * wi[2]) - jnp.cbrt(f_m * wi[2])) ** 2
+        squares = (rule.weight @ (f_p - f_m) ** 2, rule.weight @ f_m**2)
+        return squares[0].mean(), squares[1].mean(), (solid @ roots).mean(), jnp.sum(solid)
+
+    def pair(values: tuple[Array, Array]) -> tuple[Array, Array, Array, Array]:
+        p, m = with_vector(empirical, values[0]), with_vector(microfacet, values[1])
+        difference, reference, roots, solid = jax.vmap(lambda t: at(t, p, m))(jnp.asarray(theta))
+        over = jnp.asarray(weight_i)
+        albedos = [directional_albedo(f, jnp.asarray(ALBEDO_ANGLES)).mean(axis=1) for f in (p, m)]
+        flat = over / jnp.cos(jnp.asarray(theta))
+        hemisphere = jnp.sqrt((over @ difference) / (over @ reference))
+        return hemisphere, jnp.sqrt((flat @ roots) / (flat @ solid)), albedos[0], albedos[1]
+
+    return jax.lax.map(pair, (values_p, values_m))
+
+
+def fit_metrics(fit: Fit) -> dict[str, float | None]:
+    """How far a fitted model is from its measurements, by the metrics of the literature.
+
+    Returns:
+        cube_root: √(mean (∛(M κ) − ∛(f κ))²), κ = cosθ_i; log_ratio: rms of ln((M κ + ε)/(f κ + ε)), κ = cosθ_i cosθ_o,
+        ε = 10⁻³; ngan: √(mean (M − f)² κ²) up to 80° (Ngan et al. 2005); low_e2: mean of
+        (ln(1 + M κ) − ln(1 + f κ))² sinθ_i (Löw et al. 2012, E2); peak_ratio: fitted over measured maximum, median over
+        incidences and channels; misfit_ratio: discrepancy over noise.
+    """
+    m = fit.measurements
+    predicted = evaluate(fit.model, m.wi, m.wo)
+    ci, co, valid = m.wi[:, 2:3], m.wo[:, 2:3], m.valid
+    measured = np.where(valid, m.value, 0.0)
+
+    def mean(term: np.ndarray, keep: np.ndarray | bool = True) -> float | None:
+        used = term[valid & keep]
+        return float(used.mean()) if used.size else None
+
+    def root(value: float | None) -> float | None:
+        return None if value is None else value**0.5
+
+    cubes = (np.cbrt(measured * ci) - np.cbrt(predicted * ci)) ** 2
+    kappa = np.maximum(ci * co, 1e-3)
+    logs = np.log(np.maximum(measured * kappa, 0) + 1e-3) - np.log(predicted * kappa + 1e-3)
+    high = (np.maximum(m.theta_i, m.theta_o) <= np.deg2rad(80.0))[:, None]
+    low = (np.log1p(np.maximum(measured * ci, 0)) - np.log1p(predicted * ci)) ** 2
+    return {
+        "cube_root": root(mean(cubes)),
+        "log_ratio": root(mean(logs**2)),
+        "ngan": root(mean(((measured - predicted) * ci) ** 2, high)),
+        "low_e2": mean(low * np.sin(m.theta_i)[:, None]),
+        "peak_ratio": _peak_ratio(m, predicted),
+        "misfit_ratio": fit.misfit_ratio if fit.noise.known else None,
+    }
+
+
+def _peak_ratio(m: Measurements, predicted: np.ndarray) -> float | None:
+    """Fitted over measured maximum, median over incidence angles and channels."""
+    groups = np.unique(np.round(np.rad2deg(m.theta_i), 2), return_inverse=True)[1]
+    peaks = [np.full((groups.max() + 1, m.value.shape[1]), -np.inf) for _ in range(2)]
+    for peak, f in zip(peaks, (m.value, predicted), strict=True):
+        np.maximum.at(peak, groups, np.where(m.valid, f, -np.inf))
+    usable = np.isfinite(peaks[0]) & (peaks[0] > 0)
+    return float(np.median(peaks[1][usable] / peaks[0][usable])) if usable.any() else None
