@@ -1,0 +1,41 @@
+"""Options: what a file does not say about itself, said by its reader.
+
+They hold no default that would change a value in silence.
+"""
+
+import dataclasses
+
+from fitmat.errors import ReadError
+
+ALLOWED: dict[str, tuple[str | int | None, ...]] = {
+    "quantity": (None, "brdf", "brdf_cos", "reflectance_factor"),
+    "angle_unit": (None, "degrees", "radians"),
+    "forward": ("positive", "negative"),
+    "specular_azimuth": (180, 0),
+}
+"""Option → its choices, the default first; the command line offers the same."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """How to read the numbers of a table.
+
+    Attributes:
+        quantity: What a plain `value` column holds; None where the column's name says it.
+        angle_unit: "degrees" or "radians"; None for degrees, refused where the range looks like radians.
+        forward: Sign of theta_o on the mirror side, for files without azimuth.
+        specular_azimuth: Relative azimuth of the mirror side in the file, 180 or 0 degrees.
+    """
+
+    quantity: str | None = None
+    angle_unit: str | None = None
+    forward: str = "positive"
+    specular_azimuth: int = 180
+
+    def __post_init__(self) -> None:
+        for name, choices in ALLOWED.items():
+            given = getattr(self, name)
+            if given not in choices:
+                expected = " or ".join(repr(choice) for choice in choices if choice is not None)
+                flag = "--" + name.replace("_", "-")
+                raise ReadError(f"{name} = {given!r} ({flag}), expected {expected}. Choose one of these.")

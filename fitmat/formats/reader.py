@@ -1,0 +1,175 @@
+"""Reader: a table from anywhere → `Measurements`, with every assumption in its notes.
+
+It repairs nothing and drops nothing; what it cannot know it asks for.
+"""
+
+import dataclasses
+import os
+from collections.abc import Iterator, Mapping
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+import polars as pl
+
+from fitmat.errors import ReadError
+from fitmat.formats import text
+from fitmat.formats.angles import directions
+from fitmat.formats.columns import Columns, assign
+from fitmat.formats.options import Options
+from fitmat.formats.quantity import QUANTITIES, factor
+from fitmat.formats.samples import Samples, mask, pivot
+from fitmat.formats.table import Table, from_arrays
+from fitmat.geometry import from_angles
+from fitmat.measurement import Measurements, default_channels
+
+_DIGITS = 9
+
+
+@runtime_checkable
+class Frame(Protocol):
+    """A pandas or polars data frame, as far as it is read."""
+
+    @property
+    def columns(self) -> Any:
+        """Names of the columns."""
+        ...
+
+    def __getitem__(self, name: Any, /) -> Any:
+        """One column."""
+        ...
+
+
+Source = str | os.PathLike[str] | Mapping[str, Any] | Frame
+
+
+def read(
+    source: Source,
+    *,
+    columns: str | Mapping[str, str | int] | None = None,
+    quantity: str | None = None,
+    angle_unit: str | None = None,
+    forward: str = "positive",
+    specular_azimuth: int = 180,
+) -> Measurements:
+    """Read BRDF measurements from a text table, a data frame or a dict of arrays.
+
+    Columns, in any letter case (`fitmat.formats.columns.ALIASES` has more names):
+
+    - theta_i, theta_o, and phi = φ_o − φ_i or phi_i and phi_o, in degrees; the mirror side is φ = 180.
+      Without azimuth, theta_o is signed: positive is forward, the mirror side.
+    - The quantity: brdf, brdf_cos (= f_r cos θ_o) or reflectance_factor (= π f_r). One column; one for each
+      channel, as brdf_r or brdf_550; or one row for each channel, beside a column wavelength (nm) or channel.
+    - Where known: sigma, or sigma_r …, in the unit of the quantity; valid, or flag.
+
+    Args:
+        source: Path of a file, pandas or polars data frame, or name → array of n numbers.
+        columns: Our name → name or number (from 1) in the file; or as text, "theta_i=Zenith,theta_o=3".
+        quantity: What a column called value holds: "brdf", "brdf_cos" or "reflectance_factor".
+        angle_unit: "degrees" or "radians"; None for degrees, refused where the range looks like radians.
+        forward: Sign of theta_o on the mirror side where there is no azimuth: "positive" or "negative".
+        specular_azimuth: Relative azimuth of the mirror side in the file, 180 or 0.
+
+    Returns:
+        All rows, in sr⁻¹ without cosine; what cannot be used is masked (value 0, sigma 1) and counted.
+
+    Raises:
+        ReadError: what is wrong, where, what was expected, and what to do.
+
+    Example:
+        >>> read({"theta_i": [30, 30], "theta_o": [-30, 30], "brf": [1.0, 2.0]}).value.round(2).T
+        array([[0.32, 0.64]])
+    """
+    options = Options(quantity, angle_unit, forward, specular_azimuth)
+    table = _table(source)
+    layout = assign(table, columns, options.quantity)
+    samples, assumed = _samples(table, layout, options)
+    valid, masked = mask(samples)
+    if not valid.any():
+        listed = ", ".join(f"{count} {reason}" for reason, count in masked.items())
+        expected = "expected at least one value that can be used. Check the columns and units"
+        raise ReadError(f"{table.source}: every row is masked ({listed}), {expected}.")
+    theta_i, phi_i, theta_o, phi_o = np.nan_to_num(samples.angles).T
+    scale = factor(layout.quantity, theta_o)[:, None]
+    measured = Measurements(
+        wi=from_angles(theta_i, phi_i),
+        wo=from_angles(theta_o, phi_o),
+        value=np.where(valid, samples.value * scale, 0.0),
+        sigma=None if samples.sigma is None else np.where(valid, samples.sigma * scale, 1.0),
+        valid=valid,
+        channels=samples.channels,
+        source=table.source,
+        masked=masked,
+    )
+    notes = (*table.notes, QUANTITIES[layout.quantity], *assumed, *_oddities(measured, layout))
+    return dataclasses.replace(measured, notes=notes)
+
+
+def _table(source: Source) -> Table:
+    if isinstance(source, str | os.PathLike):
+        return text.load(source)
+    kind = type(source).__name__
+    if isinstance(source, Mapping):
+        return from_arrays(source, kind)
+    if not isinstance(source, Frame):
+        raise ReadError(f"{kind}: not measurements, expected a path, a data frame or a dict of arrays. Pass one.")
+    try:
+        arrays = {name: np.asarray(source[name]) for name in source.columns}
+    except (TypeError, ValueError, LookupError, AttributeError) as error:
+        raise ReadError(f"{kind}: its columns cannot be read as arrays ({error}). Pass a dict of arrays.") from error
+    return from_arrays(arrays, kind)
+
+
+def _samples(table: Table, layout: Columns, options: Options) -> tuple[Samples, tuple[str, ...]]:
+    """One row for each geometry and repeat, and what was assumed about the angles."""
+    angles, assumed = directions(table, layout.angles, options)
+    value = np.stack([table.numbers(column) for column in layout.values.values()], axis=1)
+    sigma = [table.numbers(column) for column in layout.sigmas.values()]
+    flagged = np.broadcast_to(_flagged(table, layout.marks)[:, None], value.shape)
+    samples = Samples(
+        angles=angles,
+        value=value,
+        sigma=np.stack(sigma, axis=1) if sigma else None,
+        flagged=flagged,
+        absent=np.zeros(value.shape, bool),
+        channels=tuple(layout.values) if any(layout.values) else default_channels(1),
+    )
+    labels = _labels(table, layout.marks)
+    return (samples if labels is None else pivot(samples, labels)), assumed
+
+
+def _flagged(table: Table, marks: Mapping[str, int]) -> np.ndarray:
+    """Rows that the file calls invalid, (n,); an empty `valid` means no, an empty `flag` not raised."""
+    flagged = np.zeros(len(table.lines), bool)
+    if "valid" in marks:
+        flagged |= ~(np.nan_to_num(table.truths(marks["valid"])) != 0)
+    if "invalid" in marks:
+        flagged |= np.nan_to_num(table.truths(marks["invalid"])) != 0
+    return flagged
+
+
+def _labels(table: Table, marks: Mapping[str, int]) -> np.ndarray | None:
+    """Channel of each row, (n,), as wavelength or as text; None where columns are channels."""
+    if "wavelength" in marks:
+        labels = table.numbers(marks["wavelength"])
+        wrong, expected = ~(np.isfinite(labels) & (labels > 0)), "a wavelength in nm"
+    elif "channel" in marks:
+        labels = table.words(marks["channel"])
+        wrong, expected = labels == "", "the name of a channel"
+    else:
+        return None
+    column = marks.get("wavelength", marks.get("channel", 0))
+    table.refuse(column, wrong, f"{expected}. Correct the cell, or put # before the line to leave it out.")
+    return labels
+
+
+def _oddities(measured: Measurements, layout: Columns) -> Iterator[str]:
+    """What a user should know of the rows that are kept."""
+    used = measured.rows(np.flatnonzero(measured.valid.any(axis=1)))
+    theta_i, theta_o, phi = (np.round(angle, _DIGITS) for angle in (used.theta_i, used.theta_o, used.phi))
+    phi = np.where((theta_i == 0) | (theta_o == 0), 0.0, phi)
+    if repeats := used.n_samples - pl.DataFrame([theta_i, theta_o, phi]).n_unique():
+        yield f"Rows that repeat an earlier geometry, all kept: {repeats}."
+    if negatives := np.count_nonzero(measured.value < 0):
+        yield f"Negative values kept as noise: {negatives}."
+    if layout.unused:
+        yield f"Columns not used: {', '.join(layout.unused)}."

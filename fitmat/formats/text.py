@@ -1,0 +1,155 @@
+"""Text of a table: bytes → lines → cells, whatever the encoding, delimiter, decimal mark, comments or header.
+
+It knows no column name and converts no number; a ragged row is refused, never repaired.
+"""
+
+import codecs
+import os
+import re
+from pathlib import Path
+
+import polars as pl
+
+from fitmat.errors import ReadError
+from fitmat.formats.table import MISSING, Table
+
+_BOMS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
+_LEGACY = "cp1252"
+_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
+_SPACED = re.compile(r"\d\s+[-+.]?\d")
+_COMMENT = r"^\s*(#|%|//)"
+_SEMICOLON = r"^\s*;"
+_BLANK = r"^[\s,;]*$"
+_QUOTED = r'"[^"]*"'
+_NUMBER = re.compile(r"[-+−]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|[-+]?(?i:inf|infinity)")
+_SAMPLE = 20
+_DECIMAL_COMMA = r"^[-+−]?\d*,\d+([eE][-+]?\d+)?$"
+_DECIMAL_POINT = r"^[-+−]?\d*\.\d+([eE][-+]?\d+)?$"
+
+
+def load(path: str | os.PathLike[str]) -> Table:
+    """The table in a text file, its cells as text.
+
+    Raises:
+        ReadError: the file cannot be opened, is no text, or is no table of at least one row.
+    """
+    try:
+        raw = Path(path).read_bytes()
+    except FileNotFoundError as error:
+        raise ReadError(f"{path}: no such file, expected a table of measurements. Check the path.") from error
+    except IsADirectoryError as error:
+        raise ReadError(f"{path}: a directory, expected a file. Name one file in it.") from error
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ReadError(f"{path}: cannot be opened ({reason}), expected a readable file. Check its rights.") from error
+    source = Path(path).name
+    if not raw:
+        raise ReadError(f"{source}: the file is empty (0 bytes), expected a table. Was its download cut off?")
+    text, notes = _decode(raw, source)
+    return _parse(text, source, notes)
+
+
+def _decode(raw: bytes, source: str) -> tuple[str, tuple[str, ...]]:
+    stated = [encoding for bom, encoding in _BOMS.items() if raw.startswith(bom)]
+    for encoding in stated or ["utf-8", _LEGACY]:
+        try:
+            text = raw.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        if _CONTROL.search(text):
+            break
+        return text, ("The file is not UTF-8; read as Windows-1252.",) if encoding == _LEGACY else ()
+    expected = "expected text: UTF-8, or UTF-16 with a byte-order mark"
+    raise ReadError(f"{source}: a binary file or an unknown encoding, {expected}. Export it as CSV.")
+
+
+def _parse(text: str, source: str, notes: tuple[str, ...]) -> Table:
+    lines = pl.DataFrame({"text": re.split(r"\r\n|\r|\n", text)}).with_row_index("line", offset=1)
+    lines = lines.filter(~pl.col("text").str.contains(_BLANK))
+    comment = lines["text"].str.contains(_COMMENT)
+    delimiter = _delimiter(lines.filter(~comment)["text"].head(_SAMPLE).to_list())
+    if delimiter != ";":
+        comment |= lines["text"].str.contains(_SEMICOLON)
+    rows = lines.filter(~comment)
+    if rows.is_empty():
+        expected = "expected a header line and rows of numbers. Is it the right file?"
+        raise ReadError(f"{source}: nothing but comments or blank lines, {expected}")
+    rows = rows.with_columns(text=_tidy(rows["text"], delimiter))
+    _refuse_ragged(rows, delimiter or "\t", source)
+    cells = _cells(rows, delimiter or "\t", source)
+    before = lines.filter(comment & (lines["line"] < rows["line"][0]) & lines["text"].str.contains(r"\pL"))
+    names = tuple(cells.row(0))
+    if any(_is_number(cell) for cell in names):
+        names = _commented(before["text"].tail(1).to_list(), delimiter, cells.width)
+    else:
+        rows, cells = rows.slice(1), cells.slice(1)
+    if cells.is_empty():
+        expected = "expected rows of numbers below it. Is the file complete?"
+        raise ReadError(f"{source}: a header and no rows ({', '.join(names)}), {expected}")
+    table = Table(source, names, cells, rows["line"].to_numpy(), notes)
+    _refuse_mixed_decimals(table)
+    return table
+
+
+def _delimiter(lines: list[str]) -> str | None:
+    """Tab, semicolon or comma, whichever at least half of the lines hold; None stands for white space."""
+    lines = [line.strip() for line in lines if not re.match(_SEMICOLON, line)]
+    decimal_commas = not lines or _SPACED.search(lines[0]) or "," not in lines[0]
+    for mark in "\t;" if decimal_commas else "\t;,":
+        if 0 < len(lines) <= 2 * sum(mark in line for line in lines):
+            return mark
+    return None
+
+
+def _tidy(lines: pl.Series, delimiter: str | None) -> pl.Series:
+    """White space as one tab; no blanks between delimiter and quote, which CSV forbids and people write."""
+    if delimiter is None:
+        return lines.str.strip_chars().str.replace_all(r"\s+", "\t")
+    if lines.str.contains('"', literal=True).any():
+        return lines.str.strip_chars(" ").str.replace_all(f" *{delimiter} *", delimiter)
+    return lines
+
+
+def _refuse_ragged(rows: pl.DataFrame, delimiter: str, source: str) -> None:
+    text = rows["text"].str.replace_all(_QUOTED, "")
+    counts = text.str.count_matches(delimiter, literal=True) + 1
+    for row in (text.str.contains('"', literal=True)).arg_true()[:1]:
+        got = 'a quote (") without its end, expected pairs'
+        raise ReadError(f"{source} row {rows['line'][row]}: {got}. Remove it.")
+    for row in (counts != counts[0]).arg_true()[:1]:
+        got = f"{counts[row]} cells, expected {counts[0]} as in row {rows['line'][0]}"
+        raise ReadError(f"{source} row {rows['line'][row]}: {got}. Correct the line, or put # before it.")
+
+
+def _cells(rows: pl.DataFrame, delimiter: str, source: str) -> pl.DataFrame:
+    content = "\n".join(rows["text"].to_list()).encode()
+    try:
+        cells = pl.read_csv(content, separator=delimiter, has_header=False, infer_schema=False)
+    except pl.exceptions.PolarsError as error:
+        reason = str(error).splitlines()[0]
+        got = f"not a table ({reason}), expected plain cells"
+        raise ReadError(f"{source}: {got}. Remove the quotes.") from error
+    return cells.select(pl.all().fill_null("").str.strip_chars())
+
+
+def _is_number(cell: str) -> bool:
+    return bool(_NUMBER.fullmatch(cell)) or cell.lower() in MISSING[1:]
+
+
+def _commented(comments: list[str], delimiter: str | None, width: int) -> tuple[str, ...]:
+    """Column names from the last comment line, where it has as many words as there are columns."""
+    for line in comments:
+        bare = re.sub(r"^\s*(#|%|//|;)+", "", line).strip()
+        for words in (bare.split(delimiter), bare.split()):
+            if len(words) == width:
+                return tuple(word.strip() for word in words)
+    return ("",) * width
+
+
+def _refuse_mixed_decimals(table: Table) -> None:
+    if not any(table.cells.select(pl.all().str.contains(",", literal=True).any()).row(0)):
+        return
+    if any(table.cells.select(pl.all().str.contains(_DECIMAL_POINT).any()).row(0)):
+        for column, commas in enumerate(table.cells.select(pl.all().str.contains(_DECIMAL_COMMA))):
+            expected = "one decimal mark in the file, which also has points. Write all numbers with a point."
+            table.refuse(column, commas.to_numpy(), expected)
