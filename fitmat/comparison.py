@@ -14,10 +14,10 @@ from jaxtyping import Array, Float
 from fitmat.brdf import AbstractBRDF, evaluate
 from fitmat.energy import directional_albedo, incidence, incidence_rule, lobe_rule
 from fitmat.errors import FitmatError
-from fitmat.fitting import Fit
 from fitmat.measurement import Measurements
+from fitmat.outcome import Fit
 from fitmat.params import with_vector
-from fitmat.uncertainty import Posterior
+from fitmat.posterior import Posterior
 
 DRAWS = 200
 """Posterior draws behind every interval of the match."""
@@ -56,6 +56,7 @@ class Comparison:
         empirical: Posterior of the empirical model.
         microfacet: Posterior of the microfacet model.
         hemisphere_distance: √(∫∫(f_P − f_M)² c_i c_o / ∫∫ f_M² c_i c_o), over all pairs of directions.
+        measured_distance: The same over the incidence angles of the file.
         cube_root_distance: √(mean (∛(f_P c_i) − ∛(f_M c_i))²) over solid angle, in sr^(−1/3).
         albedo_gap_max: Largest |ρ_P − ρ_M| over incidence (channel mean), 0 to 85°.
         albedo_gap_sign: −1 where the empirical model reflects less there, else +1.
@@ -72,6 +73,7 @@ class Comparison:
     empirical: Posterior
     microfacet: Posterior
     hemisphere_distance: Estimate
+    measured_distance: Estimate
     cube_root_distance: Estimate
     albedo_gap_max: Estimate
     albedo_gap_sign: int
@@ -158,16 +160,17 @@ def compare(one: Posterior, other: Posterior) -> Comparison:
     fits = empirical.fit, microfacet.fit
     draws = [np.vstack([p.fit.values, p.thinned(DRAWS)[0]]) for p in (empirical, microfacet)]
     count = min(len(d) for d in draws)
-    hemisphere, cube, albedo_p, albedo_m = (
-        np.asarray(part)
-        for part in _distances(fits[0].model, fits[1].model, *(jnp.asarray(d[:count]) for d in draws))
-    )
+    angles = jnp.asarray(_incidences(fits[0].measurements))
+    pairs = tuple(jnp.asarray(d[:count]) for d in draws)
+    computed = _distances(fits[0].model, fits[1].model, pairs, angles)
+    hemisphere, measured, cube, albedo_p, albedo_m = (np.asarray(part) for part in computed)
     gaps = albedo_p - albedo_m
     worst = int(np.argmax(np.abs(gaps[0])))
     return Comparison(
         empirical=empirical,
         microfacet=microfacet,
         hemisphere_distance=_estimate(hemisphere),
+        measured_distance=_estimate(measured),
         cube_root_distance=_estimate(cube),
         albedo_gap_max=_estimate(np.abs(gaps).max(axis=1)),
         albedo_gap_sign=int(np.sign(gaps[0, worst])) or 1,
@@ -200,31 +203,40 @@ def _parameter(posterior: Posterior, name: str, of) -> Estimate | None:
     return _estimate(of(np.r_[posterior.fit.values[place], posterior.values[:, place].ravel()]))
 
 
+def _incidences(m: Measurements) -> np.ndarray:
+    """At most 16 of the measured incidence angles in radians, evenly spread."""
+    angles = np.unique(np.round(m.theta_i[m.valid.any(axis=1)], 4))
+    return angles[np.unique(np.linspace(0, len(angles) - 1, 16).astype(int))]
+
+
 @eqx.filter_jit
 def _distances(
-    empirical: AbstractBRDF, microfacet: AbstractBRDF, values_p: Array, values_m: Array
-) -> tuple[Array, Array, Array, Array]:
-    """Hemisphere and cube-root distance (d,) and channel-mean albedos (d, k) of d pairs of draws."""
-    theta, weight_i = incidence_rule()
+    empirical: AbstractBRDF, microfacet: AbstractBRDF, values: tuple[Array, Array], angles: Array
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Hemisphere, measured and cube-root distance (d,), and channel-mean albedos (d, k), of d pairs of draws."""
+    theta, weight = (jnp.asarray(part) for part in incidence_rule())
 
     def at(theta_i: Array, p: AbstractBRDF, m: AbstractBRDF) -> tuple[Array, Array, Array, Array]:
         wi, rule = incidence(theta_i), lobe_rule(theta_i, jnp.minimum(p.width(), m.width()))
         f_p, f_m = (jax.vmap(lambda wo, f=f: jnp.atleast_1d(f(wi, wo)))(rule.wo) for f in (p, m))
         solid = jnp.where(rule.weight > 0, rule.weight / jnp.maximum(rule.wo[:, 2], 1e-12), 0.0)
         roots = (jnp.cbrt(f_p * wi[2]) - jnp.cbrt(f_m * wi[2])) ** 2
-        squares = (rule.weight @ (f_p - f_m) ** 2, rule.weight @ f_m**2)
+        squares = rule.weight @ (f_p - f_m) ** 2, rule.weight @ f_m**2
         return squares[0].mean(), squares[1].mean(), (solid @ roots).mean(), jnp.sum(solid)
 
-    def pair(values: tuple[Array, Array]) -> tuple[Array, Array, Array, Array]:
-        p, m = with_vector(empirical, values[0]), with_vector(microfacet, values[1])
-        difference, reference, roots, solid = jax.vmap(lambda t: at(t, p, m))(jnp.asarray(theta))
-        over = jnp.asarray(weight_i)
+    def pair(both: tuple[Array, Array]) -> tuple[Array, Array, Array, Array, Array]:
+        p, m = with_vector(empirical, both[0]), with_vector(microfacet, both[1])
+        nodes = jnp.concatenate([theta, angles])
+        difference, reference, roots, solid = jax.vmap(lambda t: at(t, p, m))(nodes)
+        count, flat = len(theta), weight / jnp.cos(theta)
+        hemisphere = jnp.sqrt((weight @ difference[:count]) / (weight @ reference[:count]))
+        cosines = jnp.cos(angles)
+        measured = jnp.sqrt((cosines @ difference[count:]) / (cosines @ reference[count:]))
+        cube = jnp.sqrt((flat @ roots[:count]) / (flat @ solid[:count]))
         albedos = [directional_albedo(f, jnp.asarray(ALBEDO_ANGLES)).mean(axis=1) for f in (p, m)]
-        flat = over / jnp.cos(jnp.asarray(theta))
-        hemisphere = jnp.sqrt((over @ difference) / (over @ reference))
-        return hemisphere, jnp.sqrt((flat @ roots) / (flat @ solid)), albedos[0], albedos[1]
+        return hemisphere, measured, cube, albedos[0], albedos[1]
 
-    return jax.lax.map(pair, (values_p, values_m))
+    return jax.lax.map(pair, values)
 
 
 def fit_metrics(fit: Fit) -> dict[str, float | None]:

@@ -79,6 +79,6 @@ def directional_albedo(model: AbstractBRDF, theta_i: Float[Array, " k"]) -> Floa
 
 
 def incidence_rule() -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
-    """Incidence angles (radians) and weights of ∫ g(θ_i) c_i dω_i over the hemisphere of the light: Gauss in sin²θ_i."""
+    """Incidence angles (radians) and weights of ∫ g(θ_i) c_i dω_i over the hemisphere: Gauss in sin²θ_i."""
     nodes, weights = np.polynomial.legendre.leggauss(INCIDENCE_NODES)
     return np.arcsin(np.sqrt((nodes + 1) / 2)), np.pi * weights / 2

@@ -3,31 +3,29 @@
 Gives the best parameters, how sure the data are of them locally (covariance), and what to think of the result.
 """
 
-import dataclasses
 from collections.abc import Mapping
-from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import Array, ArrayLike
 
 from fitmat.brdf import AbstractBRDF, evaluate_pairs, model
 from fitmat.errors import FitmatError, ModelError
-from fitmat.instrument import Noise, noise
+from fitmat.instrument import noise
 from fitmat.likelihood import (
     Data,
     best_discrepancy,
     first_discrepancy,
     log_likelihood,
-    noise_scale,
     prepare,
     residuals,
 )
 from fitmat.measurement import Measurements
-from fitmat.params import Entry, Space, check_range, entries, space, vector, with_vector
+from fitmat.outcome import Ends, Fit, conclude, free_places
+from fitmat.params import Space, check_range, entries, space, vector, with_vector
 from fitmat.solver import least_squares
 from fitmat.starts import starting_points
 
@@ -39,107 +37,6 @@ ROUNDS = 12
 
 SETTLED = 1e-5
 """Relative change of the discrepancy at which the alternation ends."""
-
-AGREE = 0.1
-"""Starts whose log-likelihood is within this of the best have found the same optimum."""
-
-UNDETERMINED = {"log": 1.0, "linear": 0.3}
-"""A parameter whose standard deviation exceeds this (in ln p, or as a fraction of its range) is not determined."""
-
-
-RESULTS = {
-    "converged": "Converged.",
-    "at_bound": "A parameter sits on its bound: the data ask for a value outside the model's range. "
-    "Its uncertainty is not quoted; consider another model, or fix the parameter.",
-    "unidentifiable": "At least one parameter is not determined by these angles: fix it (for example ks=1), "
-    "or measure at more incidence angles.",
-    "max_steps": "The solver ran out of steps; the numbers are its last iterate. "
-    "Raise max_steps or simplify the model.",
-    "nonfinite": "The likelihood is not finite for any start: check the data for extreme values.",
-}
-"""How a fit can end, and what that means."""
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Fit:
-    """A fitted model.
-
-    Attributes:
-        name: The model's name.
-        model: The model with the best parameters.
-        measurements: What was fitted.
-        noise: The measurement noise, given or estimated.
-        data: The samples as the likelihood sees them.
-        discrepancy: s, the spread of ∛(f cosθ_i) that the model cannot explain, in sr^(−1/3).
-        held: Fixed parameters by name.
-        result: Key of `RESULTS`.
-        steps: Levenberg–Marquardt iterations of the best start.
-        n_starts: How many starts were refined.
-        n_starts_agreeing: How many of them found the best optimum.
-        log_likelihood: At the optimum.
-        information: JᵀJ of the residuals in natural coordinates (logarithm where the scale is log), (p, p).
-        covariance: Of all physical parameters, (p, p); 0 for fixed ones, NaN for those on a bound.
-        undetermined: Names of parameters that these data do not determine.
-    """
-
-    name: str
-    model: AbstractBRDF
-    measurements: Measurements
-    noise: Noise
-    data: Data
-    discrepancy: float
-    held: dict[str, np.ndarray]
-    result: str
-    steps: int
-    n_starts: int
-    n_starts_agreeing: int
-    log_likelihood: float
-    information: Float[np.ndarray, "p p"]
-    covariance: Float[np.ndarray, "p p"]
-    undetermined: tuple[str, ...]
-
-    @property
-    def entries(self) -> tuple[Entry, ...]:
-        """The model's parameters, in the order of `values`."""
-        return entries(self.model)
-
-    @property
-    def values(self) -> Float[np.ndarray, " p"]:
-        """Best parameters, physical units."""
-        return np.asarray(vector(self.model))
-
-    @property
-    def free(self) -> np.ndarray:
-        """Indices of the parameters that were fitted."""
-        return free_places(self.model, self.held)
-
-    @property
-    def misfit_ratio(self) -> float:
-        """Discrepancy over measurement noise for the typical sample: the adequacy of the model."""
-        return self.discrepancy / float(noise_scale(self.data))
-
-    @property
-    def adequacy(self) -> str:
-        """The misfit in words."""
-        ratio = self.misfit_ratio
-        if not self.noise.known:
-            return "adequacy unknown: the noise is not known"
-        if ratio < 0.5:
-            return "follows the data within the measurement noise"
-        if ratio < 2.0:
-            return f"follows the data to about the measurement noise (misfit {ratio:.1f} × noise)"
-        return f"inadequate: misses the data by {ratio:.0f} × the measurement noise"
-
-    @property
-    def aicc(self) -> float:
-        """Akaike's criterion with the small-sample correction (Hurvich & Tsai 1989); discrepancy counted."""
-        n, k = self.measurements.n_valid, len(self.free) + 1
-        return 2 * k - 2 * self.log_likelihood + 2 * k * (k + 1) / max(n - k - 1, 1)
-
-    @property
-    def bic(self) -> float:
-        """Schwarz's criterion; discrepancy counted."""
-        return (len(self.free) + 1) * np.log(self.measurements.n_valid) - 2 * self.log_likelihood
 
 
 def fit(
@@ -187,14 +84,7 @@ def fit(
     first = first_discrepancy(data)
     starts = starting_points(template, data, first, held, STARTS)
     ends = jax.device_get(_refine(template, data, starts, first, tuple(int(k) for k in free), max_steps))
-    return _conclude(measurements, template, held, (found_noise, data), ends)
-
-
-def free_places(template: AbstractBRDF, held: Mapping[str, Any]) -> np.ndarray:
-    """Indices into the parameter vector that are not held."""
-    return np.array(
-        [k for e in entries(template) if e.name not in held for k in range(e.place.start, e.place.stop)], int
-    )
+    return conclude(measurements, template, held, (found_noise, data), ends)
 
 
 def _held(template: AbstractBRDF, fixed: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
@@ -213,20 +103,10 @@ def _held(template: AbstractBRDF, fixed: Mapping[str, ArrayLike]) -> dict[str, n
     return held
 
 
-class _Ends(eqx.Module):
-    """Where k starts ended."""
-
-    values: Array
-    discrepancy: Array
-    log_likelihood: Array
-    solved: Array
-    steps: Array
-
-
 @eqx.filter_jit
 def _refine(
     template: AbstractBRDF, data: Data, starts: Array, first: Array, free: tuple[int, ...], max_steps: int
-) -> _Ends:
+) -> Ends:
     """Alternate Levenberg–Marquardt over the parameters and the best discrepancy, from every start at once.
 
     In a location–scale family the two are information-orthogonal, so that a few rounds settle both.
@@ -241,14 +121,21 @@ def _refine(
         base, s = args
         return residuals(rebuilt(base, u), data, s)
 
-    def one(base: Array) -> _Ends:
+    def one(base: Array) -> Ends:
         def body(state: tuple) -> tuple:
             u, s, _, _, steps, rounds = state
             end = least_squares(residual, u, (base, s), max_steps=max_steps)
             predicted = evaluate_pairs(rebuilt(base, end.x), data.wi, data.wo) * data.kappa
             updated = best_discrepancy(predicted, data, s)
             settled = jnp.abs(updated - s) <= SETTLED * s
-            return end.x, updated, settled, end.result == optx.RESULTS.successful, steps + end.steps, rounds + 1
+            return (
+                end.x,
+                updated,
+                settled,
+                end.result == optx.RESULTS.successful,
+                steps + end.steps,
+                rounds + 1,
+            )
 
         def unsettled(state: tuple) -> Array:
             return ~state[2] & (state[5] < ROUNDS)
@@ -257,102 +144,10 @@ def _refine(
         begin = (coordinates.to_free(base[places]), first, jnp.array(False), jnp.array(False), zero, zero)
         u, s, settled, solved, steps, _ = jax.lax.while_loop(unsettled, body, begin)
         best = rebuilt(base, u)
-        return _Ends(vector(best), s, log_likelihood(best, data, s), settled & solved, steps)
+        return Ends(vector(best), s, log_likelihood(best, data, s), settled & solved, steps)
 
     return jax.vmap(one)(starts)
 
 
 def _subspace(whole: Space, places: np.ndarray) -> Space:
     return Space(whole.lower[places], whole.upper[places], whole.log[places])
-
-
-def _conclude(
-    m: Measurements,
-    template: AbstractBRDF,
-    held: dict[str, np.ndarray],
-    given: tuple[Noise, Data],
-    ends: _Ends,
-) -> Fit:
-    """Choose the best end, compute the covariance and classify."""
-    found_noise, data = given
-    usable = np.isfinite(ends.log_likelihood) & np.isfinite(ends.values).all(axis=1)
-    scores = np.where(usable, ends.log_likelihood, -np.inf)
-    k = int(np.argmax(scores))
-    best = with_vector(template, jnp.asarray(ends.values[k]))
-    s = float(ends.discrepancy[k])
-    free = free_places(template, held)
-    bounds = space(template).at_bound(ends.values[k])
-    inside = np.array([j for j in free if bounds[j] == 0], int)
-    jacobian = np.asarray(_natural_jacobian(best, data, jnp.asarray(s)))
-    information = jacobian.T @ jacobian
-    covariance, undetermined = _uncertainty(best, information, inside)
-    return Fit(
-        name=template.name,
-        model=best,
-        measurements=m,
-        noise=found_noise,
-        data=data,
-        discrepancy=s,
-        held=held,
-        result=_outcome(bool(usable[k]), bool(ends.solved[k]), len(inside) < len(free), undetermined),
-        steps=int(ends.steps[k]),
-        n_starts=len(scores),
-        n_starts_agreeing=int(np.count_nonzero(scores > scores[k] - AGREE)) if usable[k] else 0,
-        log_likelihood=float(ends.log_likelihood[k]),
-        information=information,
-        covariance=covariance,
-        undetermined=undetermined,
-    )
-
-
-def _outcome(usable: bool, solved: bool, on_bound: bool, undetermined: tuple[str, ...]) -> str:
-    if not usable:
-        return "nonfinite"
-    if undetermined:
-        return "unidentifiable"
-    if on_bound:
-        return "at_bound"
-    return "converged" if solved else "max_steps"
-
-
-@eqx.filter_jit
-def _natural_jacobian(best: AbstractBRDF, data: Data, s: Array) -> Array:
-    """Jacobian of the residuals in natural coordinates, (n·c, p)."""
-    coordinates = space(best)
-
-    def residual(t: Array) -> Array:
-        return residuals(with_vector(best, coordinates.physical(t)), data, s).ravel()
-
-    return jax.jacfwd(residual)(coordinates.natural(vector(best)))
-
-
-def inverse_information(information: np.ndarray, span: np.ndarray) -> np.ndarray:
-    """The inverse of an information matrix, huge but finite along directions that the data do not determine.
-
-    Args:
-        information: JᵀJ, (k, k), natural coordinates.
-        span: Widths of the bounds in the same coordinates, (k,); they set the scale of "huge".
-    """
-    scaled = np.nan_to_num(information * np.outer(span, span))
-    eigenvalues, vectors = np.linalg.eigh(scaled)
-    floor = max(1e-14 * float(eigenvalues.max(initial=0.0)), 1e-12)
-    return (vectors / np.maximum(eigenvalues, floor)) @ vectors.T * np.outer(span, span)
-
-
-def _uncertainty(
-    best: AbstractBRDF, information: np.ndarray, inside: np.ndarray
-) -> tuple[Float[np.ndarray, "p p"], tuple[str, ...]]:
-    """Covariance (JᵀJ)⁻¹ in physical parameters, and what is not determined."""
-    coordinates, values = space(best), np.asarray(vector(best))
-    span = coordinates.natural_upper - coordinates.natural_lower
-    natural = inverse_information(information[np.ix_(inside, inside)], span[inside])
-    sd = np.sqrt(np.diagonal(natural))
-    limit = np.where(coordinates.log, UNDETERMINED["log"], UNDETERMINED["linear"] * span)[inside]
-    loose = set(inside[~(sd <= limit)])
-    slope = np.where(coordinates.log, values, 1.0)[inside]
-    covariance = np.zeros((len(values), len(values)))
-    covariance[np.ix_(inside, inside)] = natural * np.outer(slope, slope)
-    on_bound = coordinates.at_bound(values) != 0
-    covariance[on_bound, :] = covariance[:, on_bound] = np.nan
-    names = tuple(e.name for e in entries(best) if loose & set(range(e.place.start, e.place.stop)))
-    return covariance, names

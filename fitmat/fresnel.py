@@ -4,6 +4,7 @@ Each is a small module with its own parameters, so that any microfacet model can
 """
 
 from abc import abstractmethod
+from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -17,7 +18,7 @@ _TINY = 1e-300
 class AbstractFresnel(eqx.Module):
     """Reflectance of an interface as a function of the angle to the micro-normal."""
 
-    suffix: eqx.AbstractClassVar[str]
+    suffix: ClassVar[str]
 
     @abstractmethod
     def __call__(self, cos_d: Scalar) -> Spectrum:
@@ -31,7 +32,7 @@ class AbstractFresnel(eqx.Module):
 class Dielectric(AbstractFresnel):
     """Exact unpolarised Fresnel reflectance of a dielectric with relative index eta."""
 
-    suffix = ""
+    suffix: ClassVar[str] = ""
     eta: Spectrum = param(
         1.0, 50.0, symbol="η", scale="log", starts=(1.1, 1.3, 1.5, 2.0, 4.0, 20.0), default=1.5,
         doc="index of refraction; plastics and varnish 1.4–1.6, F0 = ((η−1)/(η+1))²",
@@ -49,7 +50,7 @@ class Dielectric(AbstractFresnel):
 class Conductor(AbstractFresnel):
     """Exact unpolarised Fresnel reflectance of a conductor with complex index η + iκ."""
 
-    suffix = "-conductor"
+    suffix: ClassVar[str] = "-conductor"
     eta: Spectrum = param(
         0.01, 50.0, symbol="η", scale="log", per_channel=True, starts=(0.2, 1.0, 2.5), default=1.0,
         doc="real part of the index of refraction; gold 0.2 (red), aluminium 1, iron 2.9",
@@ -72,7 +73,7 @@ class Conductor(AbstractFresnel):
 class Schlick(AbstractFresnel):
     """Schlick's approximation with the reflectance at normal incidence f0."""
 
-    suffix = "-schlick"
+    suffix: ClassVar[str] = "-schlick"
     f0: Spectrum = param(
         1e-4, 0.999, symbol="F0", scale="log", per_channel=True, starts=(0.02, 0.05, 0.15, 0.5, 0.9),
         default=0.04, doc="reflectance at normal incidence; plastics 0.04, metals 0.5–0.98",

@@ -119,10 +119,7 @@ def _lagrange(nodes: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Weights of the cubic through four nodes (m, 4), evaluated at (m,)."""
     others = [[j for j in range(4) if j != k] for k in range(4)]
     return np.stack(
-        [
-            np.prod((at[:, None] - nodes[:, o]) / (nodes[:, [k]] - nodes[:, o]), axis=1)
-            for k, o in enumerate(others)
-        ],
+        [np.prod((at[:, None] - nodes[:, o]) / (nodes[:, [k]] - nodes[:, o]), axis=1) for k, o in enumerate(others)],
         axis=1,
     )
 

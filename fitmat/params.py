@@ -198,6 +198,4 @@ def check_range(model: eqx.Module) -> None:
         part, p = values[entry.place], entry.param
         bad = part[~((part >= p.lower) & (part <= p.upper))]
         if bad.size:
-            raise ModelError(
-                f"parameter {entry.name} = {bad[0]:g}: expected a value from {p.lower:g} to {p.upper:g}."
-            )
+            raise ModelError(f"parameter {entry.name} = {bad[0]:g}: expected a value from {p.lower:g} to {p.upper:g}.")

@@ -6,7 +6,6 @@ f0), linearly for kd, ks and the discrepancy s ≥ 0. This is the only room that
 
 import dataclasses
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import equinox as eqx
@@ -17,18 +16,10 @@ from jaxtyping import Array, Float
 
 from fitmat.brdf import AbstractBRDF
 from fitmat.errors import FitmatError
-from fitmat.fitting import Fit, inverse_information
 from fitmat.likelihood import Data, log_likelihood, noise_scale
+from fitmat.outcome import Fit, inverse_information
 from fitmat.params import space, vector, with_vector
-
-ENOUGH_TAU = 50
-"""A chain of this many autocorrelation times is long enough (emcee's documentation)."""
-
-ENOUGH_ESS = 400
-"""Independent draws per parameter that are enough for a 95 % interval (Vehtari et al. 2021)."""
-
-GOOD_RHAT = 1.05
-"""Split-R̂ over walkers up to which the posterior counts as converged."""
+from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, Diagnostics, Posterior, split_rhat
 
 CHUNK = 250
 """Steps between looks at the autocorrelation time."""
@@ -39,103 +30,6 @@ Progress = Callable[[int, int], None]
 """Called with steps done and steps expected."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Diagnostics:
-    """How a chain went; arrays follow the sampled coordinates (free parameters, then s).
-
-    Attributes:
-        tau: Integrated autocorrelation time in steps.
-        ess: Effective number of independent draws.
-        rhat: Split-R̂ over walkers.
-        acceptance: Accepted fraction of proposals.
-        steps: Steps per walker, burn-in included.
-        burn_in: Steps left out.
-        walkers: Number of walkers.
-        seed: What the run was started with.
-        interrupted: True if stopped by the user.
-    """
-
-    tau: np.ndarray
-    ess: np.ndarray
-    rhat: np.ndarray
-    acceptance: float
-    steps: int
-    burn_in: int
-    walkers: int
-    seed: int
-    interrupted: bool
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Posterior:
-    """Draws of a fit's parameters.
-
-    Attributes:
-        fit: What was sampled.
-        method: "laplace" or "emcee".
-        values: Physical parameter vectors, (m, p), fixed parameters included.
-        discrepancy: s of each draw, (m,).
-        chain: For emcee, the same before flattening, (steps, walkers, free + 1), physical; else None.
-        diagnostics: For emcee; else None.
-    """
-
-    fit: Fit
-    method: str
-    values: Float[np.ndarray, "m p"]
-    discrepancy: Float[np.ndarray, " m"]
-    chain: np.ndarray | None = None
-    diagnostics: Diagnostics | None = None
-
-    @property
-    def verdict(self) -> str:
-        """"reliable", "tentative" or "unusable"; "not sampled" for Laplace."""
-        if self.diagnostics is None:
-            return "not sampled"
-        d = self.diagnostics
-        kept = d.steps - d.burn_in
-        if not np.isfinite(d.tau).all() or kept < 10 * d.tau.max() or d.rhat.max() > 1.2:
-            return "unusable"
-        enough = kept >= ENOUGH_TAU * d.tau.max() and d.ess.min() >= ENOUGH_ESS and d.rhat.max() <= GOOD_RHAT
-        return "reliable" if enough else "tentative"
-
-    @property
-    def usable(self) -> bool:
-        """Whether intervals may be taken from these draws."""
-        return self.verdict != "unusable"
-
-    def sd(self) -> Float[np.ndarray, " p"]:
-        """Standard deviation of each parameter."""
-        return self.values.std(axis=0)
-
-    def interval(self, level: float = 0.95) -> Float[np.ndarray, "p 2"]:
-        """Central credible interval of each parameter."""
-        return np.quantile(self.values, [(1 - level) / 2, (1 + level) / 2], axis=0).T
-
-    def thinned(self, count: int) -> tuple[Float[np.ndarray, "k p"], Float[np.ndarray, " k"]]:
-        """At most `count` draws spread evenly over the run: parameter vectors and discrepancies."""
-        chosen = np.linspace(0, len(self.values) - 1, min(count, len(self.values))).astype(int)
-        return self.values[chosen], self.discrepancy[chosen]
-
-    def save(self, path: str | Path) -> None:
-        """Write the draws as ArviZ netCDF (group `posterior`, dimensions chain = walker, draw = step)."""
-        from arviz_base import from_dict
-
-        chain = self.values[None] if self.chain is None else np.swapaxes(self.chain, 0, 1)
-        variables: dict[str, np.ndarray] = {}
-        free = [e for e in self.fit.entries if e.name not in self.fit.held]
-        start = 0
-        for entry in free:
-            part = chain[..., start : start + entry.size] if self.chain is not None else chain[..., entry.place]
-            variables[entry.name] = part if entry.shape else part[..., 0]
-            start += entry.size
-        variables["discrepancy"] = self.discrepancy[None] if self.chain is None else chain[..., -1]
-        attributes: dict[str, Any] = {"model": self.fit.name, "method": self.method, "verdict": self.verdict}
-        if self.diagnostics is not None:
-            attributes |= {"seed": self.diagnostics.seed, "burn_in": self.diagnostics.burn_in}
-        tree = from_dict({"posterior": variables}, attrs={"posterior": attributes})
-        tree.to_netcdf(str(path), engine="h5netcdf")
-
-
 def laplace(fit: Fit, *, seed: int) -> Posterior:
     """Draws from the Gaussian with the fit's covariance in natural coordinates, folded into the bounds.
 
@@ -143,9 +37,11 @@ def laplace(fit: Fit, *, seed: int) -> Posterior:
         fit: A fit with a finite optimum.
         seed: Seed of the draws.
 
-    Raises:
-        FitmatError: the fit is not finite.
+    Returns:
+        A `Posterior`; a fit that is not finite gives a single, unusable draw.
     """
+    if not fit.finite:
+        return Posterior(fit, "laplace", fit.values[None], np.array([fit.discrepancy]))
     natural = _laplace_draws(fit, LAPLACE_DRAWS, np.random.default_rng(seed))
     values, discrepancy = _physical(fit, natural)
     return Posterior(fit, "laplace", values, discrepancy)
@@ -180,12 +76,14 @@ def sample(
     """
     import emcee
 
+    if not fit.finite:
+        raise FitmatError(f"{fit.name}: the fit ended {fit.result}, there is nothing to sample; check the data.")
     rng = np.random.default_rng(seed)
     dimensions = len(fit.free) + 1
     walkers = walkers or max(32, 4 * dimensions)
     moves = [(emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2)]
     sampler = emcee.EnsembleSampler(walkers, dimensions, log_posterior(fit), moves=moves, vectorize=True)
-    random_state = np.random.RandomState(rng.integers(2**32)).get_state()  # noqa: NPY002 - emcee's own interface
+    random_state = np.random.RandomState(rng.integers(2**32)).get_state()
     state = emcee.State(_laplace_draws(fit, walkers, rng), random_state=random_state)
     goal, interrupted = 2 * CHUNK, False
     try:
@@ -196,8 +94,8 @@ def sample(
                 progress(sampler.iteration, min(max(goal, sampler.iteration), max_steps))
     except KeyboardInterrupt:
         interrupted = True
-    if sampler.iteration < 2:
-        raise KeyboardInterrupt
+    if sampler.iteration < 4:
+        return dataclasses.replace(laplace(fit, seed=seed), interrupted=True)
     return _posterior(fit, sampler, seed, interrupted)
 
 
@@ -225,18 +123,8 @@ def _posterior(fit: Fit, sampler: Any, seed: int, interrupted: bool) -> Posterio
         burn_in=burn_in,
         walkers=walkers,
         seed=seed,
-        interrupted=interrupted,
     )
-    return Posterior(fit, "emcee", values, discrepancy, physical.reshape(chain.shape), found)
-
-
-def split_rhat(chain: Float[np.ndarray, "steps walkers d"]) -> Float[np.ndarray, " d"]:
-    """Split-R̂ with every half of every walker as a chain (Gelman et al., Bayesian Data Analysis, sec. 11.4)."""
-    half = len(chain) // 2
-    parts = np.concatenate([chain[:half], chain[half : 2 * half]], axis=1)
-    within = parts.var(axis=0, ddof=1).mean(axis=0)
-    between = parts.mean(axis=0).var(axis=0, ddof=1)
-    return np.sqrt((half - 1) / half + between / np.where(within > 0, within, np.nan))
+    return Posterior(fit, "emcee", values, discrepancy, physical.reshape(chain.shape), found, interrupted)
 
 
 def log_posterior(fit: Fit) -> Callable[[np.ndarray], np.ndarray]:
@@ -267,8 +155,6 @@ def _log_density(template: AbstractBRDF, data: Data, free: tuple[int, ...], x: A
 
 def _laplace_draws(fit: Fit, count: int, rng: np.random.Generator) -> Float[np.ndarray, "count d"]:
     """Gaussian draws of the free natural coordinates and s, folded at the bounds."""
-    if not np.isfinite(fit.log_likelihood):
-        raise FitmatError(f"{fit.name}: the fit ended {fit.result}, there is nothing to sample; check the data.")
     whole, free = space(fit.model), fit.free
     low, high = whole.natural_lower[free], whole.natural_upper[free]
     centre = np.asarray(whole.natural(vector(fit.model)))[free]

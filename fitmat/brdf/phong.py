@@ -9,6 +9,7 @@ from fitmat.brdf.base import AbstractBRDF
 from fitmat.geometry import above, half_vector, mirror
 from fitmat.params import param
 
+
 def _ks() -> Any:
     return param(
         0.0, 10.0, symbol="k_s", per_channel=True, weight=True, default=1.0,

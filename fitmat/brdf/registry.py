@@ -18,7 +18,7 @@ from fitmat.brdf.walter import Microfacet
 from fitmat.errors import ModelError
 from fitmat.fresnel import AbstractFresnel, Conductor, Dielectric, Schlick
 from fitmat.microfacet import GGX, MASKINGS, AbstractDistribution, Beckmann
-from fitmat.params import check_range
+from fitmat.params import as_parameter, check_range
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,9 +74,7 @@ def lobe_names(name: str) -> list[str]:
     return parts
 
 
-def model(
-    name: str, *, masking: str | None = None, channels: int | None = None, **values: ArrayLike
-) -> AbstractBRDF:
+def model(name: str, *, masking: str | None = None, channels: int | None = None, **values: ArrayLike) -> AbstractBRDF:
     """Build a model from its name.
 
     Args:
@@ -114,9 +112,12 @@ def model(
 def _lobe(lobe: Lobe, masking: str | None, channels: int | None, values: dict[str, ArrayLike]) -> AbstractBRDF:
     numbers = {}
     for key, (_, default) in lobe.defaults().items():
-        value = values.get(key, default)
-        broad = channels is not None and lobe.per_channel(key)
-        numbers[key] = np.broadcast_to(np.asarray(value, float), (channels,)) if broad else value
+        value = as_parameter(values.get(key, default))
+        if channels is not None and lobe.per_channel(key):
+            if value.size not in (1, channels):
+                raise ModelError(f"parameter {key} has {value.size} values: expected 1 or {channels}, one a channel.")
+            value = np.broadcast_to(np.ravel(value), (channels,))
+        numbers[key] = value
     if lobe.fresnel is None:
         return lobe.shape(**numbers)
     own = {f.name for f in dataclasses.fields(lobe.fresnel)}

@@ -1,0 +1,176 @@
+"""What a person at a terminal sees while a study runs and when it is done.
+
+Progress goes to stderr, results to stdout; nothing is computed here.
+"""
+
+import inspect
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from fitmat.brdf import LOBES, lobe_names, model
+from fitmat.comparison import Comparison, compare, is_empirical, is_microfacet
+from fitmat.errors import ModelError
+from fitmat.fitting import fit
+from fitmat.measurement import Measurements
+from fitmat.outcome import RESULTS
+from fitmat.params import entries
+from fitmat.posterior import Posterior
+from fitmat.report import rows
+from fitmat.uncertainty import laplace, sample
+
+
+def assignments(texts: Sequence[str], option: str) -> dict[str, np.ndarray]:
+    """`NAME=VALUE` texts as arrays; a value may be a comma-separated list, one number per channel.
+
+    Raises:
+        ModelError: a text is not of that form.
+    """
+    found = {}
+    for text in texts:
+        name, equals, values = text.partition("=")
+        try:
+            found[name.strip()] = np.array([float(v) for v in values.split(",")])
+        except ValueError as error:
+            raise ModelError(f"{option} {text!r}: expected NAME=NUMBER, for example ks=1.") from error
+        if not equals or not name.strip():
+            raise ModelError(f"{option} {text!r}: expected NAME=NUMBER, for example ks=1.")
+    return found
+
+
+def model_names(text: str) -> list[str]:
+    """A comma-separated list of model names, checked, without repeats."""
+    names = ["+".join(lobe_names(part)) for part in text.split(",") if part.strip()]
+    if not names:
+        raise ModelError("no model given; try --models lambert+blinn-phong,lambert+ggx.")
+    return list(dict.fromkeys(names))
+
+
+def study(
+    measurements: Measurements,
+    names: Sequence[str],
+    *,
+    fixed: Mapping[str, np.ndarray],
+    masking: str | None,
+    sampling: bool,
+    seed: int,
+) -> tuple[list[Posterior], Comparison | None]:
+    """Fit, sample and compare, with a progress bar on stderr.
+
+    A fixed parameter or a masking applies to every model that has it; at least one must. An interrupt during sampling
+    keeps what was done and leaves the remaining models to Laplace's approximation.
+    """
+    posteriors: list[Posterior] = []
+    with Progress(
+        SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(),
+        console=Console(stderr=True), transient=True,
+    ) as bar:  # fmt: skip
+        for name in names:
+            task = bar.add_task(f"fitting {name}", total=None)
+            found = fit(measurements, name, **_options(name, names, fixed, masking))
+            if not (sampling and found.finite):
+                posteriors.append(laplace(found, seed=seed))
+                continue
+            bar.update(task, description=f"sampling {name}")
+            posterior = sample(found, seed=seed, progress=lambda done, total, task=task: bar.update(
+                task, completed=done, total=total))  # fmt: skip
+            posteriors.append(posterior)
+            sampling = not posterior.interrupted
+        bar.add_task("comparing", total=None)
+        return posteriors, _match(posteriors)
+
+
+def _options(name: str, names: Sequence[str], fixed: Mapping[str, np.ndarray], masking: str | None) -> dict[str, Any]:
+    """What of --fix and --masking concerns this model; refuses what concerns none."""
+    known = {n: {e.name for e in entries(model(n))} for n in names}
+    for key in fixed:
+        if not any(key in has for has in known.values()):
+            every = ", ".join(sorted(set().union(*known.values())))
+            raise ModelError(f"--fix {key}: no model of {', '.join(names)} has it; they have {every}.")
+    chosen: dict[str, Any] = {"fixed": {k: v for k, v in fixed.items() if k in known[name]}}
+    if masking is not None and is_microfacet(name):
+        chosen["masking"] = masking
+    elif masking is not None and not any(is_microfacet(n) for n in names):
+        raise ModelError(f"--masking {masking}: none of {', '.join(names)} has a masking to choose.")
+    return chosen
+
+
+def _match(posteriors: Sequence[Posterior]) -> Comparison | None:
+    """The match of the first empirical and the first microfacet model, if there are both."""
+    empirical = next((p for p in posteriors if is_empirical(p.fit.name)), None)
+    microfacet = next((p for p in posteriors if is_microfacet(p.fit.name) and not is_empirical(p.fit.name)), None)
+    return compare(empirical, microfacet) if empirical and microfacet else None
+
+
+def show(posteriors: Sequence[Posterior], match: Comparison | None, folder: Path) -> None:
+    """Print the parameters of every model, the verdict and where the report is."""
+    out = Console()
+    m = posteriors[0].fit.measurements
+    out.print(str(m), markup=False, highlight=False)
+    out.print(posteriors[0].fit.noise.words, markup=False, highlight=False)
+    for posterior in posteriors:
+        out.print(_table(posterior))
+        if posterior.fit.result != "converged":
+            out.print(f"[yellow]{posterior.fit.result}[/yellow]: {RESULTS[posterior.fit.result]}", highlight=False)
+        if posterior.interrupted:
+            out.print("[yellow]interrupted[/yellow]: sampling was stopped; what was done is kept.", highlight=False)
+    words = match.verdict if match else " ".join(f"{p.fit.name} {p.fit.adequacy}." for p in posteriors)
+    out.print(f"\n[bold]{words}[/bold]\n", highlight=False)
+    out.print(f"Report: {folder / 'report.html'}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _table(posterior: Posterior) -> Table:
+    fit = posterior.fit
+    agreeing = f"{fit.n_starts_agreeing} of {fit.n_starts} starts agree"
+    table = Table(
+        title=f"{fit.name}: {fit.result}, {agreeing}, posterior {posterior.verdict}",
+        title_justify="left",
+        title_style="bold",
+        box=None,
+        pad_edge=False,
+    )
+    for heading in ("parameter", "", "value ± sd", "95 % interval", "unit", ""):
+        table.add_column(heading, no_wrap=heading != "")
+    for row in rows(posterior):
+        name = f"→ {row['name']}" if row["kind"] == "follows" else row["name"]
+        table.add_row(name, row["symbol"], row["value"], row["interval"], row["unit"], row["remark"])
+    return table
+
+
+def list_models() -> None:
+    """Print every lobe with its parameters and the first line of its manual page."""
+    table = Table(box=None, pad_edge=False)
+    for heading in ("lobe", "parameters", "what it is"):
+        table.add_column(heading, no_wrap=heading == "lobe")
+    for name, lobe in LOBES.items():
+        first = (lobe.shape.__doc__ or "").splitlines()[0]
+        table.add_row(name, ", ".join(lobe.defaults()), first)
+    out = Console()
+    out.print(table)
+    out.print(
+        "\nA model is a sum of lobes: lambert+ggx. 'fitmat models ggx' prints the manual page of a lobe.",
+        highlight=False,
+    )
+
+
+def manual(name: str) -> None:
+    """Print the manual page of every lobe of a model, and its parameters."""
+    out = Console()
+    for part in lobe_names(name):
+        lobe = LOBES[part]
+        out.print(f"[bold]{part}[/bold]\n")
+        out.print(inspect.cleandoc(lobe.shape.__doc__ or ""), markup=False, highlight=False)
+        table = Table(box=None, pad_edge=False)
+        for heading in ("parameter", "symbol", "range", "default", "channels", "meaning"):
+            table.add_column(heading)
+        for key, (p, default) in lobe.defaults().items():
+            spread = "one each" if lobe.per_channel(key) else "shared"
+            table.add_row(key, p.symbol, f"{p.lower:g} – {p.upper:g}", f"{default:g}", spread, p.doc)
+        out.print()
+        out.print(table)
+        out.print()

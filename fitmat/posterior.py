@@ -1,0 +1,130 @@
+"""Draws of a fit's parameters, how the sampler went, and whether the draws may be trusted.
+
+Draws nothing itself; `uncertainty` does.
+"""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from fitmat.outcome import Fit
+
+ENOUGH_TAU = 50
+"""A chain of this many autocorrelation times is long enough (emcee's documentation)."""
+
+ENOUGH_ESS = 400
+"""Independent draws per parameter that are enough for a 95 % interval (Vehtari et al. 2021)."""
+
+GOOD_RHAT = 1.05
+"""Split-R̂ over walkers up to which the posterior counts as converged."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Diagnostics:
+    """How a chain went; arrays follow the sampled coordinates (free parameters, then s).
+
+    Attributes:
+        tau: Integrated autocorrelation time in steps.
+        ess: Effective number of independent draws.
+        rhat: Split-R̂ over walkers.
+        acceptance: Accepted fraction of proposals.
+        steps: Steps per walker, burn-in included.
+        burn_in: Steps left out.
+        walkers: Number of walkers.
+        seed: What the run was started with.
+    """
+
+    tau: np.ndarray
+    ess: np.ndarray
+    rhat: np.ndarray
+    acceptance: float
+    steps: int
+    burn_in: int
+    walkers: int
+    seed: int
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Posterior:
+    """Draws of a fit's parameters.
+
+    Attributes:
+        fit: What was sampled.
+        method: "laplace" or "emcee".
+        values: Physical parameter vectors, (m, p), fixed parameters included.
+        discrepancy: s of each draw, (m,).
+        chain: For emcee, the same before flattening, (steps, walkers, free + 1), physical; else None.
+        diagnostics: For emcee; else None.
+        interrupted: Whether the user stopped the sampling.
+    """
+
+    fit: Fit
+    method: str
+    values: Float[np.ndarray, "m p"]
+    discrepancy: Float[np.ndarray, " m"]
+    chain: np.ndarray | None = None
+    diagnostics: Diagnostics | None = None
+    interrupted: bool = False
+
+    @property
+    def verdict(self) -> str:
+        """One of "reliable", "tentative", "unusable", and "not sampled" for Laplace."""
+        if not self.fit.finite:
+            return "unusable"
+        if self.diagnostics is None:
+            return "not sampled"
+        d = self.diagnostics
+        kept = d.steps - d.burn_in
+        if not np.isfinite(d.tau).all() or kept < 10 * d.tau.max() or d.rhat.max() > 1.2:
+            return "unusable"
+        enough = kept >= ENOUGH_TAU * d.tau.max() and d.ess.min() >= ENOUGH_ESS and d.rhat.max() <= GOOD_RHAT
+        return "reliable" if enough else "tentative"
+
+    @property
+    def usable(self) -> bool:
+        """Whether intervals may be taken from these draws."""
+        return self.verdict != "unusable"
+
+    def sd(self) -> Float[np.ndarray, " p"]:
+        """Standard deviation of each parameter."""
+        return self.values.std(axis=0)
+
+    def interval(self, level: float = 0.95) -> Float[np.ndarray, "p 2"]:
+        """Central credible interval of each parameter."""
+        return np.quantile(self.values, [(1 - level) / 2, (1 + level) / 2], axis=0).T
+
+    def thinned(self, count: int) -> tuple[Float[np.ndarray, "k p"], Float[np.ndarray, " k"]]:
+        """At most `count` draws spread evenly over the run: parameter vectors and discrepancies."""
+        chosen = np.linspace(0, len(self.values) - 1, min(count, len(self.values))).astype(int)
+        return self.values[chosen], self.discrepancy[chosen]
+
+    def save(self, path: str | Path) -> None:
+        """Write the draws as ArviZ netCDF (group `posterior`, dimensions chain = walker, draw = step)."""
+        from arviz_base import from_dict
+
+        chain = self.values[None] if self.chain is None else np.swapaxes(self.chain, 0, 1)
+        variables: dict[str, np.ndarray] = {}
+        free = [e for e in self.fit.entries if e.name not in self.fit.held]
+        start = 0
+        for entry in free:
+            part = chain[..., start : start + entry.size] if self.chain is not None else chain[..., entry.place]
+            variables[entry.name] = part if entry.shape else part[..., 0]
+            start += entry.size
+        variables["discrepancy"] = self.discrepancy[None] if self.chain is None else chain[..., -1]
+        attributes: dict[str, Any] = {"model": self.fit.name, "method": self.method, "verdict": self.verdict}
+        if self.diagnostics is not None:
+            attributes |= {"seed": self.diagnostics.seed, "burn_in": self.diagnostics.burn_in}
+        tree = from_dict({"posterior": variables}, attrs={"posterior": attributes})
+        tree.to_netcdf(str(path), engine="h5netcdf")
+
+
+def split_rhat(chain: Float[np.ndarray, "steps walkers d"]) -> Float[np.ndarray, " d"]:
+    """Split-R̂ with every half of every walker as a chain (Gelman et al., Bayesian Data Analysis, sec. 11.4)."""
+    half = len(chain) // 2
+    parts = np.concatenate([chain[:half], chain[half : 2 * half]], axis=1)
+    within = parts.var(axis=0, ddof=1).mean(axis=0)
+    between = parts.mean(axis=0).var(axis=0, ddof=1)
+    return np.sqrt((half - 1) / half + between / np.where(within > 0, within, np.nan))

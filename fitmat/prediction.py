@@ -1,0 +1,89 @@
+"""What a fit predicts: curves of the best model, and bands in which a new measurement would fall.
+
+Gives arrays; draws nothing.
+"""
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from fitmat.brdf import AbstractBRDF, evaluate, evaluate_pairs
+from fitmat.geometry import from_angles
+from fitmat.likelihood import from_stabilised, prepare, stabilised
+from fitmat.measurement import Measurements
+from fitmat.outcome import Fit
+from fitmat.params import with_vector
+from fitmat.posterior import Posterior
+
+BAND_DRAWS = 200
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Section:
+    """The in-plane samples of one incidence angle, sorted by signed theta_o.
+
+    Attributes:
+        theta_i: Incidence, radians.
+        rows: Indices into the measurements, (k,).
+        theta_o: Signed, positive on the mirror side, radians, (k,).
+    """
+
+    theta_i: float
+    rows: np.ndarray
+    theta_o: np.ndarray
+
+
+def sections(m: Measurements, most: int = 8) -> list[Section]:
+    """In-plane curves with at least three valid samples, by incidence; `most` of them, evenly spread."""
+    usable = m.in_plane & m.valid.any(axis=1)
+    rounded = np.round(np.rad2deg(m.theta_i), 2)
+    found = []
+    for angle in np.unique(rounded[usable]):
+        rows = np.flatnonzero(usable & (rounded == angle))
+        if len(rows) >= 3:
+            rows = rows[np.argsort(m.signed_theta_o[rows])]
+            found.append(Section(float(np.deg2rad(angle)), rows, m.signed_theta_o[rows]))
+    if len(found) <= most:
+        return found
+    return [found[k] for k in np.linspace(0, len(found) - 1, most).astype(int)]
+
+
+def curve(fit: Fit, theta_i: float, theta_o: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k c"]:
+    """The fitted BRDF in sr⁻¹ along an in-plane curve; signed theta_o, radians."""
+    wi = from_angles(np.full_like(theta_o, theta_i), np.zeros_like(theta_o))
+    wo = from_angles(np.abs(theta_o), np.where(theta_o >= 0, np.pi, 0.0))
+    return evaluate(fit.model, wi, wo)
+
+
+def predictive_band(posterior: Posterior, rows: np.ndarray, *, seed: int) -> Float[np.ndarray, "2 k c"]:
+    """95 % band of a new measurement at the given rows, in sr⁻¹: parameters, noise and discrepancy together.
+
+    Args:
+        posterior: Of the fit.
+        rows: Indices into the fit's measurements, each with at least one valid channel, (k,).
+        seed: Of the simulated noise.
+
+    Returns:
+        Lower and upper limit, (2, k, c).
+    """
+    fit = posterior.fit
+    noise = dataclasses.replace(fit.noise, sigma=fit.noise.sigma[rows])
+    data = prepare(fit.measurements.rows(rows), noise)
+    values, s = posterior.thinned(BAND_DRAWS)
+    normal = np.random.default_rng(seed).standard_normal((len(s), *data.x.shape))
+    parts = (jnp.asarray(values), jnp.asarray(s), jnp.asarray(normal))
+    return np.asarray(_band(fit.model, data, *parts))
+
+
+@eqx.filter_jit
+def _band(template: AbstractBRDF, data, values: Array, discrepancy: Array, normal: Array) -> Array:
+    def draw(value: Array, s: Array, e: Array) -> Array:
+        x = evaluate_pairs(with_vector(template, value), data.wi, data.wo) * data.kappa
+        return from_stabilised(stabilised(x, data.noise, s) + e, data.noise, s, x) / data.kappa
+
+    draws = jax.vmap(draw)(values, discrepancy, normal)
+    return jnp.quantile(draws, jnp.array([0.025, 0.975]), axis=0)

@@ -1,0 +1,252 @@
+"""The report: one HTML page, one JSON object and the posteriors, written together or not at all.
+
+Formats numbers that other rooms computed; computes none.
+"""
+
+import base64
+import contextlib
+import io
+import json
+import math
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+from matplotlib.figure import Figure
+
+from fitmat import plots
+from fitmat.comparison import CLOSE, SIMILAR, Comparison, Estimate, fit_metrics
+from fitmat.errors import OutputError
+from fitmat.measurement import Measurements
+from fitmat.outcome import RESULTS
+from fitmat.posterior import Posterior
+from fitmat.prediction import sections
+from fitmat.summary import Quantity, derived, parameters
+
+DPI = 96
+CHANNELS_DRAWN = 3
+
+
+def default_folder(source: Path) -> Path:
+    """`NAME-fitmat` beside the input, or the first `NAME-fitmat-2`, `-3`, … that does not exist."""
+    first = source.parent / f"{source.stem}-fitmat"
+    if not first.exists():
+        return first
+    return next(p for k in range(2, 10_000) if not (p := first.with_name(f"{first.name}-{k}")).exists())
+
+
+@contextlib.contextmanager
+def new_folder(target: Path, *, force: bool = False) -> Iterator[Path]:
+    """A folder to write into that appears as `target`, complete, when the block ends well.
+
+    Args:
+        target: The folder to make.
+        force: Replace the files of an earlier run in `target`.
+
+    Raises:
+        OutputError: `target` holds something and `force` is off, or the disk refuses.
+    """
+    if target.exists() and (not target.is_dir() or any(target.iterdir())) and not force:
+        raise OutputError(f"{target} already exists; give another --out DIR, or --force to replace the run in it.")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        draft = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
+    except OSError as error:
+        raise OutputError(
+            f"cannot write beside {target}: {error.strerror}; choose another place with --out."
+        ) from error
+    try:
+        yield draft
+        target.mkdir(exist_ok=True)
+        for item in sorted(draft.iterdir()):
+            os.replace(item, target / item.name)
+        target.chmod(0o755)
+    except OSError as error:
+        raise OutputError(f"cannot write {target}: {error.strerror}; nothing there was changed.") from error
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def write(folder: Path, posteriors: Sequence[Posterior], match: Comparison | None) -> None:
+    """Write `report.html`, `fit.json` and one `posterior-MODEL.nc` per model into an existing folder."""
+    found = to_dict(posteriors, match)
+    (folder / "fit.json").write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    for posterior in posteriors:
+        posterior.save(folder / f"posterior-{posterior.fit.name}.nc")
+    (folder / "report.html").write_text(to_html(posteriors, match), encoding="utf-8")
+
+
+def to_dict(posteriors: Sequence[Posterior], match: Comparison | None) -> dict[str, Any]:
+    """What the report holds, as JSON types; numbers that are not finite become null."""
+    m = posteriors[0].fit.measurements
+    return _plain(
+        {
+            "file": m.source,
+            "n_samples": m.n_samples,
+            "n_masked": m.n_masked,
+            "masked": m.masked,
+            "notes": list(m.notes),
+            "noise": posteriors[0].fit.noise.words,
+            "channels": list(m.channels),
+            "fits": [_fit_dict(p, len(m.channels)) for p in posteriors],
+            "match": None if match is None else _match_dict(match),
+        }
+    )
+
+
+def _fit_dict(posterior: Posterior, channels: int) -> dict[str, Any]:
+    fit, d = posterior.fit, posterior.diagnostics
+    diagnosed = {"ess_min": None, "rhat_max": None, "tau_max": None}
+    if d is not None:
+        diagnosed = {"ess_min": d.ess.min(), "rhat_max": d.rhat.max(), "tau_max": d.tau.max()}
+        diagnosed |= {"acceptance": d.acceptance, "steps": d.steps, "burn_in": d.burn_in, "walkers": d.walkers}
+        diagnosed |= {"seed": d.seed}
+    return {
+        "model": fit.name,
+        "result": fit.result,
+        "result_means": RESULTS[fit.result],
+        "adequacy": fit.adequacy,
+        "not_determined": list(fit.undetermined),
+        "n_starts": fit.n_starts,
+        "n_starts_agreeing": fit.n_starts_agreeing,
+        "steps": fit.steps,
+        "parameters": {q.name: _quantity_dict(q, channels) for q in parameters(posterior)},
+        "derived": {q.name: _quantity_dict(q, channels) for q in derived(posterior)},
+        "posterior": {"verdict": posterior.verdict, "interrupted": posterior.interrupted, **diagnosed},
+        "metrics": fit_metrics(fit),
+        "log_likelihood": fit.log_likelihood,
+        "aicc": fit.aicc,
+        "bic": fit.bic,
+    }
+
+
+def _quantity_dict(q: Quantity, channels: int) -> dict[str, Any]:
+    """Scalars for shared quantities and single-channel files, else lists in channel order."""
+    scalar = not q.per_channel or channels == 1
+    value, sd, ci95 = ((a[0] if scalar else a) for a in (q.value, q.sd, q.ci95))
+    return {"value": value, "sd": sd, "ci95": ci95, "unit": q.unit, "symbol": q.symbol, "remark": q.remark}
+
+
+def _match_dict(match: Comparison) -> dict[str, Any]:
+    def estimate(e: Estimate | None) -> dict[str, Any] | None:
+        return None if e is None else {"value": e.value, "ci95": list(e.ci95)}
+
+    return {
+        "empirical": match.empirical.fit.name,
+        "microfacet": match.microfacet.fit.name,
+        "hemisphere_distance": estimate(match.hemisphere_distance),
+        "measured_distance": estimate(match.measured_distance),
+        "cube_root_distance": estimate(match.cube_root_distance),
+        "albedo_gap_max": {
+            **(estimate(match.albedo_gap_max) or {}),
+            "theta_i_deg": match.albedo_gap_theta_i_deg,
+            "sign": match.albedo_gap_sign,
+        },
+        "implied_exponent": estimate(match.implied_exponent),
+        "fitted_exponent": estimate(match.fitted_exponent),
+        "delta_aicc": match.delta_aicc,
+        "delta_bic": match.delta_bic,
+        "verdict": match.verdict,
+    }
+
+
+def _plain(thing: Any) -> Any:
+    """JSON types only: arrays to lists, NaN and infinity to None."""
+    if isinstance(thing, dict):
+        return {key: _plain(value) for key, value in thing.items()}
+    if isinstance(thing, list | tuple):
+        return [_plain(value) for value in thing]
+    if isinstance(thing, np.ndarray | np.generic):
+        return _plain(thing.tolist())
+    return None if isinstance(thing, float) and not math.isfinite(thing) else thing
+
+
+def with_error(value: float, sd: float) -> str:
+    """A value to the precision of its standard deviation: `0.1503 ± 0.0010`; four digits where there is none."""
+    if not math.isfinite(sd) or sd <= 0 or sd > 1e6 * abs(value):
+        return f"{value:.4g}"
+    digits = max(0, 1 - math.floor(math.log10(sd)))
+    return f"{value:.{digits}f} ± {sd:.{digits}f}"
+
+
+def rows(posterior: Posterior) -> list[dict[str, str]]:
+    """One line per reported number, as text: name, symbol, value, interval, remark, what it means."""
+    channels = posterior.fit.measurements.channels
+    result = []
+    for kind, quantities in (("fitted", parameters(posterior)), ("follows", derived(posterior))):
+        for q in quantities:
+            for k in range(len(q.value)):
+                low, high = q.ci95[k]
+                channel = f" {channels[k]}" if q.per_channel and len(channels) > 1 else ""
+                free = q.remark != "fixed" and np.isfinite(low) and np.isfinite(high)
+                result.append(
+                    {
+                        "kind": kind,
+                        "name": q.name + channel,
+                        "symbol": q.symbol,
+                        "value": with_error(q.value[k], q.sd[k]),
+                        "interval": f"{low:.4g} – {high:.4g}" if free else "",
+                        "unit": "" if q.unit == "1" else q.unit,
+                        "remark": q.remark,
+                        "doc": q.doc,
+                    }
+                )
+    return result
+
+
+def to_html(posteriors: Sequence[Posterior], match: Comparison | None) -> str:
+    """The page: verdict, pictures, then numbers; pictures are embedded, nothing is fetched."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("fitmat"), autoescape=True, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters["png"] = _png
+    return environment.get_template("report.html").render(
+        posteriors=posteriors,
+        measurements=posteriors[0].fit.measurements,
+        match=match,
+        close=CLOSE,
+        similar=SIMILAR,
+        rows=rows,
+        results=RESULTS,
+        metrics=fit_metrics,
+        curves=_curves(posteriors),
+        residuals=_residuals(posteriors),
+        albedo=None if match is None else plots.plot_albedo(match).figure,
+        corners=[(p.fit.name, plots.plot_corner(p)) for p in posteriors],
+    )
+
+
+def _curves(posteriors: Sequence[Posterior]) -> list[tuple[str, Figure]]:
+    m: Measurements = posteriors[0].fit.measurements
+    found = sections(m)
+    drawn = np.unique(np.linspace(0, len(m.channels) - 1, CHANNELS_DRAWN).astype(int)) if found else []
+    pages = []
+    for channel in drawn:
+        columns = min(3, len(found))
+        lines = -(-len(found) // columns)
+        figure = Figure(figsize=(3.6 * columns, 2.7 * lines + 0.3), layout="constrained")
+        for k, section in enumerate(found):
+            ax = figure.add_subplot(lines, columns, k + 1)
+            plots.plot_section(posteriors, section, channel=int(channel), ax=ax)
+        handles, labels = figure.axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), fontsize=9, frameon=False)
+        pages.append((m.channels[channel], figure))
+    return pages
+
+
+def _residuals(posteriors: Sequence[Posterior]) -> Figure:
+    figure = Figure(figsize=(5.0 * len(posteriors), 3.0), layout="constrained")
+    for k, posterior in enumerate(posteriors):
+        plots.plot_residuals(posterior.fit, ax=figure.add_subplot(1, len(posteriors), k + 1))
+    return figure
+
+
+def _png(figure: Figure) -> str:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=DPI)
+    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -1,0 +1,131 @@
+"""Parameters as people read them: value, standard deviation, interval, unit, symbol; and what follows from them.
+
+Takes all numbers from a posterior; formats nothing.
+"""
+
+import dataclasses
+
+import numpy as np
+
+from fitmat.fresnel import eta_from_f0, f0_from_eta
+from fitmat.params import space
+from fitmat.posterior import Posterior
+
+Z95 = 1.959964
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Quantity:
+    """One reported quantity; arrays hold one entry per channel, or a single one for shared quantities.
+
+    Attributes:
+        name: Parameter name.
+        symbol: The letter of the literature.
+        unit: "1" for none.
+        doc: What it means.
+        value: Best fit, (k,).
+        sd: Standard deviation, (k,); NaN where `remark` says why there is none.
+        ci95: 95 % interval, (k, 2).
+        per_channel: Whether the k entries are channels.
+        remark: "" or a reason: "fixed", "at its lower bound", "not determined by these angles".
+    """
+
+    name: str
+    symbol: str
+    unit: str
+    doc: str
+    value: np.ndarray
+    sd: np.ndarray
+    ci95: np.ndarray
+    per_channel: bool
+    remark: str
+
+
+def parameters(posterior: Posterior) -> list[Quantity]:
+    """The model's parameters, then the discrepancy s.
+
+    Value: the best fit. Intervals: quantiles of the sampled posterior where it is usable; otherwise Laplace, computed
+    in the logarithm for parameters whose scale is log.
+    """
+    fit = posterior.fit
+    sampled = posterior.method == "emcee" and posterior.usable
+    sd = posterior.sd() if sampled else np.sqrt(np.diagonal(fit.covariance))
+    ci95 = posterior.interval() if sampled else _laplace_interval(posterior, sd)
+    bound = space(fit.model).at_bound(fit.values)
+    result = []
+    for entry in fit.entries:
+        side, held = bound[entry.place], entry.name in fit.held
+        remark = "fixed" if held else ""
+        if entry.name in fit.undetermined:
+            remark = "not determined by these angles"
+        elif side.any() and not held:
+            remark = f"at its {'lower' if side[side != 0][0] < 0 else 'upper'} bound"
+        given = np.where((side != 0) | held, np.nan, sd[entry.place])
+        p = entry.param
+        result.append(
+            Quantity(
+                *(entry.name, p.symbol, p.unit, p.doc, fit.values[entry.place], given, ci95[entry.place]),
+                per_channel=bool(entry.shape),
+                remark=remark,
+            )
+        )
+    return [*result, _discrepancy(posterior)]
+
+
+def _discrepancy(posterior: Posterior) -> Quantity:
+    draws = posterior.discrepancy
+    words = "spread of ∛(f cosθ_i) that the model cannot explain"
+    interval = np.quantile(draws, [[0.025, 0.975]], axis=0)
+    best = np.array([posterior.fit.discrepancy])
+    return Quantity("discrepancy", "s", "sr^(-1/3)", words, best, np.array([draws.std()]), interval, False, "")
+
+
+def _laplace_interval(posterior: Posterior, sd: np.ndarray) -> np.ndarray:
+    fit, coordinates = posterior.fit, space(posterior.fit.model)
+    v = fit.values
+    with np.errstate(over="ignore"):
+        ratio = np.exp(Z95 * sd / np.where(coordinates.log, v, 1.0))
+        low = np.where(coordinates.log, v / ratio, v - Z95 * sd)
+        high = np.where(coordinates.log, v * ratio, v + Z95 * sd)
+    return np.stack([np.maximum(low, coordinates.lower), np.minimum(high, coordinates.upper)], axis=1)
+
+
+def derived(posterior: Posterior) -> list[Quantity]:
+    """What follows from the parameters, with intervals from the draws.
+
+    f0 and eta from each other (or f0 from η + iκ); the exponent 2/α² − 2 of the Blinn lobe as wide as a microfacet
+    lobe and the alpha √(2/(n+2)) of a Phong lobe; the artists' roughness √α.
+    """
+    fit = posterior.fit
+    names = {e.name: e for e in fit.entries}
+    draws = np.vstack([fit.values, posterior.values])
+
+    def of(name: str) -> np.ndarray:
+        return draws[:, names[name].place]
+
+    found = []
+    if "eta" in names and "kappa" in names:
+        square, eta = of("kappa") ** 2, of("eta")
+        reflectance = ((eta - 1) ** 2 + square) / ((eta + 1) ** 2 + square)
+        found.append(("f0", "F0", "reflectance at normal incidence", reflectance, "eta"))
+    elif "eta" in names:
+        reflectance = np.asarray(f0_from_eta(of("eta")))
+        found.append(("f0", "F0", "reflectance at normal incidence", reflectance, "eta"))
+    elif "f0" in names:
+        index = np.asarray(eta_from_f0(of("f0")))
+        found.append(("eta", "η", "index of the dielectric with that F0", index, "f0"))
+    if "alpha" in names:
+        alpha = of("alpha")
+        found.append(("exponent", "n", "exponent of the Blinn lobe as wide, 2/α² − 2", 2 / alpha**2 - 2, "alpha"))
+        found.append(("roughness", "√α", "artists' roughness", np.sqrt(alpha), "alpha"))
+    if "exponent" in names:
+        width = np.sqrt(2 / (of("exponent") + 2))
+        found.append(("alpha", "α", "slope of the microfacet lobe as wide, √(2/(n+2))", width, "exponent"))
+    return [_from_draws(*item, posterior) for item in found]
+
+
+def _from_draws(name: str, symbol: str, doc: str, draws: np.ndarray, source: str, posterior: Posterior) -> Quantity:
+    origin = next(q for q in parameters(posterior) if q.name == source)
+    ci95 = np.quantile(draws[1:], [0.025, 0.975], axis=0).T
+    sd = np.where(np.isfinite(origin.sd), draws[1:].std(axis=0), np.nan)
+    return Quantity(name, symbol, "1", doc, draws[0], sd, ci95, origin.per_channel, origin.remark)

@@ -1,0 +1,295 @@
+"""Lobes against Mitsuba 3, closed forms and finite differences; and what `model` and `evaluate` refuse."""
+
+from types import ModuleType
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import fitmat as fm
+from fitmat.brdf import LOBES, AbstractBRDF, evaluate_pairs
+from fitmat.errors import ModelError
+from fitmat.params import space, vector, with_vector
+
+MITSUBA = 1e-5
+"""Relative; single precision, for alpha ≥ 0.1: D multiplies the rounding of h, 6e-8, by about 4/alpha."""
+
+MITSUBA_GRAZING = 1e-4
+"""Within 3° of grazing, where ω_i + ω_o loses digits as well."""
+
+MITSUBA_SLOPE = 1e-3
+"""Relative to |f/p|; differences of single-precision values (1e-6) over 4 % of p, and their h⁴."""
+
+DIFFERENCES = 1e-7
+"""Relative to |∂f/∂p| + |f/p|; five-point differences, steps h = 1e-4 p: (2h ln f)⁴ and 1e-16/h."""
+
+UNDERFLOW = 1e-25
+"""Lobes fainter than this (sr⁻¹) carry no light and vary too fast for the step of the differences."""
+
+EXACT = 1e-12
+"""Relative; the same formula written twice in double precision."""
+
+QUADRATURE = 1e-8
+"""Relative; scipy's adaptive rule on a smooth integrand."""
+
+Hemisphere = Any
+Pairs = dict[str, tuple[np.ndarray, np.ndarray]]
+
+
+def _pairs_for_mitsuba(distribution: str, alpha: float, number: int = 4000) -> tuple[np.ndarray, np.ndarray]:
+    """Uniform ω_i, and normals drawn from D so that sharp lobes are hit; single precision, (n, 3)."""
+    rng = np.random.default_rng(7)
+    cos, phi_i, u, phi_h = rng.uniform(size=(4, 4 * number)) * np.array([[1], [2 * np.pi], [1], [2 * np.pi]])
+    wi = np.stack([np.sqrt(1 - cos**2) * np.cos(phi_i), np.sqrt(1 - cos**2) * np.sin(phi_i), cos], 1)
+    tan = alpha * np.sqrt(u / (1 - u) if distribution == "ggx" else -np.log1p(-u))
+    h = np.stack([tan * np.cos(phi_h), tan * np.sin(phi_h), np.ones_like(tan)], 1) / np.sqrt(1 + tan**2)[:, None]
+    wo = 2 * np.sum(wi * h, axis=1, keepdims=True) * h - wi
+    kept = (wo[:, 2] > 0) & (np.sum(wi * h, axis=1) > 0)
+    return wi[kept][:number].astype(np.float32), wo[kept][:number].astype(np.float32)
+
+
+def _mitsuba(mi: ModuleType, wi: np.ndarray, wo: np.ndarray, **plugin: object) -> np.ndarray:
+    """f·cosθ_o of Mitsuba's rough conductor."""
+    bsdf, context, point = (
+        mi.load_dict({"type": "roughconductor", **plugin}),
+        mi.BSDFContext(),
+        mi.SurfaceInteraction3f(),
+    )
+    values = []
+    for i, o in zip(wi, wo, strict=True):
+        point.wi = i
+        values.append(bsdf.eval(context, point, o)[0])
+    return np.array(values)
+
+
+def _walter_g1_ratio(cos: jax.Array, alpha: jax.Array) -> jax.Array:
+    """Beckmann's G1: Walter et al. 2007's rational approximation, which Mitsuba uses, over the exact one."""
+    a = cos / (alpha * jnp.sqrt(1 - cos**2))
+    approximate = jnp.where(a < 1.6, (3.535 * a + 2.181 * a**2) / (1 + 2.276 * a + 2.577 * a**2), 1.0)
+    exact = 2 / (1 + jax.scipy.special.erf(a) + jnp.exp(-(a**2)) / (a * jnp.sqrt(jnp.pi)))
+    return approximate / exact
+
+
+def _ours_as_mitsuba(model: AbstractBRDF, values: jax.Array, wi: np.ndarray, wo: np.ndarray) -> jax.Array:
+    """f·cosθ_o on the rounded directions, and with Walter's G1 where Mitsuba has it."""
+    i, o = (np.float64(w) / np.linalg.norm(np.float64(w), axis=1, keepdims=True) for w in (wi, wo))
+    f = evaluate_pairs(with_vector(model, values), jnp.array(i), jnp.array(o))[:, 0] * o[:, 2]
+    if model.name.startswith("ggx"):
+        return f
+    return f * _walter_g1_ratio(i[:, 2], values[1]) * _walter_g1_ratio(o[:, 2], values[1])
+
+
+@pytest.mark.parametrize("alpha", [0.1, 0.3, 1.0])
+@pytest.mark.parametrize("distribution", ["ggx", "beckmann"])
+def test_rough_conductor_agrees_with_mitsuba(mitsuba: ModuleType, distribution: str, alpha: float) -> None:
+    """12,000 pairs a distribution; Mitsuba is separable, the height-correlated form must be told apart."""
+    wi, wo = _pairs_for_mitsuba(distribution, alpha)
+    theirs = _mitsuba(mitsuba, wi, wo, distribution=distribution, alpha=alpha, eta=1.5, k=2.9)
+    error = {}
+    for masking in ("separable", "correlated"):
+        model = fm.model(f"{distribution}-conductor", alpha=alpha, eta=1.5, kappa=2.9, masking=masking)
+        error[masking] = np.abs(_ours_as_mitsuba(model, vector(model), wi, wo) / theirs - 1)
+    grazing = np.minimum(wi[:, 2], wo[:, 2]) < np.sin(np.deg2rad(3))
+    assert np.all(error["separable"] < np.where(grazing, MITSUBA_GRAZING, MITSUBA))
+    assert np.max(error["correlated"]) > 0.1
+
+
+@pytest.mark.parametrize("distribution", ["ggx", "beckmann"])
+def test_slopes_agree_with_mitsuba(mitsuba: ModuleType, distribution: str) -> None:
+    """jax.jacrev in alpha, eta and kappa against five-point differences of Mitsuba's values.
+
+    Left out: pairs whose differences straddle a = 1.6, where Walter's approximation jumps by 6e-5.
+    """
+    at = {"alpha": 0.3, "eta": 1.5, "k": 2.9}
+    wi, wo = _pairs_for_mitsuba(distribution, at["alpha"], 300)
+    a = np.array([w[:, 2] / np.hypot(w[:, 0], w[:, 1]) / at["alpha"] for w in (wi, wo)])
+    smooth = np.all(np.abs(a / 1.6 - 1) > 0.05, axis=0)
+    wi, wo = wi[smooth], wo[smooth]
+    model = fm.model(f"{distribution}-conductor", alpha=0.3, eta=1.5, kappa=2.9, masking="separable")
+    slopes = jax.jit(jax.jacrev(lambda values: _ours_as_mitsuba(model, values, wi, wo)))(vector(model))
+    for column, (name, value) in enumerate(at.items(), start=1):
+        step = 0.02 * value
+        f = [
+            _mitsuba(mitsuba, wi, wo, distribution=distribution, **at | {name: value + j * step})
+            for j in (-2, -1, 1, 2)
+        ]
+        theirs = (f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * step)
+        assert np.all(np.abs(slopes[:, column] - theirs) < MITSUBA_SLOPE * (f[1] + f[2]) / 2 / value), name
+
+
+def _normal_albedo(model: AbstractBRDF) -> float:
+    """∫ f cosθ dω at normal incidence."""
+    up, evaluate = np.array([[0.0, 0.0, 1.0]]), fm.evaluate
+
+    def ring(cos: float) -> float:
+        wo = np.array([[np.sqrt(1 - cos**2), 0.0, cos]])
+        return 2 * np.pi * cos * float(evaluate(model, up, wo)[0, 0])
+
+    return quad(ring, 0, 1, epsrel=1e-10, limit=200)[0]
+
+
+@pytest.mark.parametrize("exponent", [0.1, 1.0, 4.0, 50.0, 1000.0])
+@pytest.mark.parametrize("name", ["phong", "blinn-phong-exact"])
+def test_phong_lobes_reflect_ks_at_normal_incidence(name: str, exponent: float) -> None:
+    """Mitsuba 3 has no Phong plugin; the integral is known: 2π ∫ (n+2)/(2π) cⁿ⁺¹ dc = 1."""
+    assert _normal_albedo(fm.model(name, ks=0.7, exponent=exponent)) == pytest.approx(0.7, rel=QUADRATURE)
+
+
+@pytest.mark.parametrize(("exponent", "albedo"), [(1.0, 1.024), (4.0, 1.063), (10.0, 1.075)])
+def test_blinn_phong_of_the_courses_reflects_too_much(exponent: float, albedo: float) -> None:
+    """(n+8)/(8π) over the exact (n+2)(n+4)/(8π(2^(−n/2)+n)) of F. Giesen 2009, by hand to three digits."""
+    by_hand = (exponent + 8) * (2 ** (-exponent / 2) + exponent) / ((exponent + 2) * (exponent + 4))
+    assert by_hand == pytest.approx(albedo, abs=5e-4)
+    assert _normal_albedo(fm.model("blinn-phong", exponent=exponent)) == pytest.approx(by_hand, rel=QUADRATURE)
+
+
+@pytest.mark.parametrize(
+    ("name", "peak"), [("blinn-phong", 12 / (8 * np.pi)), ("blinn-phong-exact", 48 / (8 * np.pi * 4.25))]
+)
+def test_blinn_phong_peaks_at_n_4(name: str, peak: float) -> None:
+    """0.47746 and 0.44938 sr⁻¹."""
+    up = np.array([[0.0, 0.0, 1.0]])
+    np.testing.assert_allclose(fm.evaluate(fm.model(name, exponent=4.0), up, up), [[peak]], rtol=EXACT)
+
+
+def test_lobes_by_hand() -> None:
+    """Light at 60°, sensor at 30° on the mirror side: r·ω_o = cos 30°, h at 15°, ω_i·h = cos 45°."""
+    wi, wo = np.array([[np.sqrt(0.75), 0, 0.5]]), np.array([[-0.5, 0, np.sqrt(0.75)]])
+    ch, cd, ci, co, alpha = np.cos(np.pi / 12), np.sqrt(0.5), 0.5, np.sqrt(0.75), 0.5
+    fresnel = 0.5 + 0.5 * (1 - cd) ** 5
+    d_cook = np.exp(-((np.tan(np.pi / 12) / alpha) ** 2)) / (alpha**2 * ch**4)
+    d_ggx = alpha**2 / (np.pi * ((alpha**2 - 1) * ch**2 + 1) ** 2)
+    g_cook = min(1, 2 * ch * ci / cd, 2 * ch * co / cd)
+    g_ggx = 2 / (np.sqrt(1 + alpha**2 * 3) + np.sqrt(1 + alpha**2 / 3))
+    expected = {
+        "lambert": 0.25 / np.pi,
+        "phong": 12 / (2 * np.pi) * np.cos(np.pi / 6) ** 10,
+        "blinn-phong": 18 / (8 * np.pi) * ch**10,
+        "cook-torrance-schlick": fresnel * d_cook * g_cook / (np.pi * ci * co),
+        "ggx-schlick": fresnel * d_ggx * g_ggx / (4 * ci * co),
+    }
+    given: dict[str, dict[str, Any]] = {
+        "lambert": {"kd": 0.25},
+        "phong": {"exponent": 10},
+        "blinn-phong": {"exponent": 10},
+    }
+    for name, value in expected.items():
+        model = fm.model(name, **given.get(name, {"alpha": alpha, "f0": 0.5}))
+        np.testing.assert_allclose(fm.evaluate(model, wi, wo), [[value]], rtol=EXACT, err_msg=name)
+
+
+def test_cook_torrance_is_four_times_walter(hemisphere: Hemisphere) -> None:
+    """D' = π D and π for 4: with V cavities and Beckmann normals the two differ by exactly 4."""
+    wi, wo = hemisphere(200, 8), hemisphere(200, 9)
+    walter = fm.evaluate(fm.model("beckmann", alpha=0.4, masking="v-cavity"), wi, wo)
+    np.testing.assert_allclose(fm.evaluate(fm.model("cook-torrance", alpha=0.4), wi, wo), 4 * walter, rtol=EXACT)
+
+
+def _directions(hemisphere: Hemisphere, singular: Pairs) -> tuple[np.ndarray, np.ndarray]:
+    """Random pairs, random mirror pairs, and the singular sets."""
+    wi = hemisphere(60, 10)
+    apart, mirrored = hemisphere(60, 11), wi * [-1, -1, 1]
+    special_i, special_o = (np.array(column) for column in zip(*singular.values(), strict=True))
+    return np.concatenate([wi, wi, special_i]), np.concatenate([apart, mirrored, special_o])
+
+
+@pytest.mark.parametrize("name", [*LOBES, "lambert+phong"])
+def test_gradients_are_finite_differences(name: str, hemisphere: Hemisphere, singular: Pairs) -> None:
+    """Every parameter of every lobe, drawn within its bounds; reverse mode, and forward mode the same."""
+    model = fm.model(name)
+    wi, wo = map(jnp.array, _directions(hemisphere, singular))
+
+    def one(values: jax.Array, wi: jax.Array, wo: jax.Array) -> jax.Array:
+        return jnp.sum(with_vector(model, values)(wi, wo))
+
+    f, reverse, forward = (jax.jit(jax.vmap(t(one), (None, 0, 0))) for t in (lambda g: g, jax.grad, jax.jacfwd))
+    coordinates, rng = space(model), np.random.default_rng(12)
+    low, span = coordinates.natural_lower, coordinates.natural_upper - coordinates.natural_lower
+    for _ in range(4):
+        point = np.asarray(coordinates.physical(jnp.array(low + span * rng.uniform(0.02, 0.98, len(low)))))
+        slopes, value = np.asarray(reverse(point, wi, wo)), np.asarray(f(point, wi, wo))
+        np.testing.assert_allclose(forward(point, wi, wo), slopes, rtol=EXACT, atol=EXACT * np.abs(slopes).max())
+        for k, step in enumerate(1e-4 * point):
+            at = [np.asarray(f(point + j * step * (np.arange(len(point)) == k), wi, wo)) for j in (-2, -1, 1, 2)]
+            expected = (at[0] - 8 * at[1] + 8 * at[2] - at[3]) / (12 * step)
+            scale = np.abs(slopes[:, k]) + (value + UNDERFLOW) / point[k]
+            assert np.all(np.abs(slopes[:, k] - expected) < DIFFERENCES * scale + UNDERFLOW), (k, point)
+
+
+def test_channels_are_independent(hemisphere: Hemisphere) -> None:
+    """Column k of a model with three values per channel is the model with value k."""
+    wi, wo, f0 = hemisphere(20, 13), hemisphere(20, 14), np.array([0.02, 0.1, 0.6])
+    columns = fm.evaluate(fm.model("lambert+ggx-schlick", kd=0.3, f0=f0, channels=3), wi, wo)
+    single = [fm.evaluate(fm.model("lambert+ggx-schlick", kd=0.3, f0=v), wi, wo)[:, 0] for v in f0]
+    np.testing.assert_allclose(columns, np.stack(single, axis=1), rtol=EXACT)
+
+
+def test_channels_widen_only_what_is_per_channel() -> None:
+    """With a Fresnel level per channel the specular weight is shared, else both could scale each other."""
+    assert len(vector(fm.model("ggx", channels=3))) == 3 + 1 + 1
+    assert len(vector(fm.model("ggx-schlick", channels=3))) == 1 + 1 + 3
+    assert len(vector(fm.model("ggx-conductor", channels=3))) == 1 + 1 + 3 + 3
+    assert len(vector(fm.model("lambert+phong", channels=2))) == 2 + 2 + 1
+
+
+def test_names_are_read_loosely_and_written_strictly() -> None:
+    assert fm.model("Lambert + GGX").name == "lambert+ggx"
+    assert all(fm.model(name).name == name for name in LOBES)
+
+
+def test_a_sum_is_as_narrow_as_its_narrowest_lobe() -> None:
+    """√(2/(n+2)) of Blinn's lobe; Phong's is half as wide in h because r·ω_o turns twice as fast."""
+    assert float(fm.model("lambert+ggx", alpha=0.2).width()) == pytest.approx(0.2)
+    assert float(fm.model("blinn-phong", exponent=48.0).width()) == pytest.approx(0.2)
+    assert float(fm.model("lambert+phong", exponent=48.0).width()) == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("ggxx", {}, r"model 'ggxx': no lobe 'ggxx'; known lobes are lambert, phong, .*ggx-schlick"),
+        ("ggx+", {}, r"model 'ggx\+': no lobe ''; known lobes are"),
+        ("ggx+ggx", {}, r"the same lobe twice cannot be told apart"),
+        ("lambert", {"ks": 1.0}, r"model 'lambert' has no parameter 'ks'; it has kd\."),
+        ("ggx", {"roughness": 0.1}, r"has no parameter 'roughness'; it has alpha, eta, ks\."),
+        ("ggx", {"masking": "smith"}, r"masking 'smith': expected one of correlated, separable, v-cavity\."),
+        ("lambert+phong", {"masking": "separable"}, r"model 'lambert\+phong' has no masking to choose"),
+        ("ggx", {"alpha": 2.0}, r"parameter alpha = 2: expected a value from 0\.0001 to 1\."),
+        ("lambert", {"kd": -0.1}, r"parameter kd = -0\.1: expected a value from 0 to 1\."),
+        ("lambert", {"kd": "red"}, r"parameter value 'red': expected a number or one number per channel"),
+        (
+            "lambert",
+            {"kd": "red", "channels": 3},
+            r"parameter value 'red': expected a number or one number per channel",
+        ),
+        (
+            "lambert",
+            {"kd": [0.1, 0.2], "channels": 3},
+            r"parameter kd has 2 values: expected 1 or 3, one a channel\.",
+        ),
+    ],
+)
+def test_model_refuses(name: str, options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ModelError, match=message):
+        fm.model(name, **options)
+
+
+@pytest.mark.parametrize(
+    ("wi", "wo", "message"),
+    [
+        (
+            np.zeros((2, 3)),
+            np.zeros((3, 3)),
+            r"wi and wo have shapes \(2, 3\) and \(3, 3\): expected the same \(n, 3\)",
+        ),
+        ([0.0, 0.0, 1.0], [0.0, 0.0, 1.0], r"shapes \(3,\) and \(3,\): expected the same \(n, 3\)"),
+        ([[0, 0, 1], [0, 0, 2.0]], [[0, 0, 1], [0, 0, 1]], r"wi row 1 has length 2: expected unit vectors"),
+        ([[0, 0, 1.0]], [[0, np.nan, 1]], r"wo row 0 has length nan: expected unit vectors"),
+    ],
+)
+def test_evaluate_refuses(wi: Any, wo: Any, message: str) -> None:
+    with pytest.raises(ModelError, match=message):
+        fm.evaluate(fm.model("lambert"), wi, wo)
