@@ -92,9 +92,10 @@ def fit(
     _setup()
     from fitmat import console, report
     from fitmat.formats import read
+    from fitmat.params import assignments
 
     reading: dict[str, Any] = {"columns": columns, "quantity": quantity, "angle_unit": angle_unit}
-    names, fixed = console.model_names(models), console.assignments(fix or [], "--fix")
+    names, fixed = console.model_names(models), assignments(fix or [], "--fix")
     measurements = read(file, **reading, forward=forward, specular_azimuth=specular_azimuth)
     target = out or report.default_folder(file)
     with report.new_folder(target, force=force) as folder:
@@ -108,6 +109,46 @@ def fit(
         console.show(posteriors, match, target)
     if any(p.fit.result != "converged" or p.interrupted for p in posteriors):
         raise typer.Exit(NOT_CONVERGED)
+
+
+@app.command()
+def simulate(
+    model: Annotated[str | None, typer.Argument(help="True model, e.g. lambert+ggx.", show_default=False)] = None,
+    out: Annotated[Path, typer.Option(help="CSV file to write.")] = Path("simulated.csv"),
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="A true parameter, e.g. alpha=0.2 or kd=0.4,0.1,0.1; repeat.", show_default=False),
+    ] = None,
+    theta_i: Annotated[str, typer.Option(help="Incidence angles in degrees.")] = "10,30,45,60,75",
+    theta_o: Annotated[
+        str, typer.Option(help="Outgoing angles in degrees, FIRST:LAST:STEP or a list; positive = mirror side.")
+    ] = "-80:80:2",
+    noise: Annotated[float, typer.Option(min=0, help="Relative noise, as a fraction of the true value.")] = 0.02,
+    floor: Annotated[float, typer.Option(min=0, help="Absolute noise in sr⁻¹.")] = 1e-3,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
+    masking: Annotated[
+        str | None, typer.Option(help="Masking: correlated, separable, v-cavity.", show_default=False)
+    ] = None,
+    catalogue: Annotated[
+        Path | None,
+        typer.Option(help="Write the catalogue of synthetic materials into this folder instead.", show_default=False),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
+) -> None:
+    """Simulate measurements of a known material, to test an instrument's plan or fitmat itself.
+
+    Example: fitmat simulate lambert+ggx --set kd=0.3 --set alpha=0.2 --noise 0.03 --out plastic.csv
+    """
+    _setup()
+    from fitmat import simulation
+
+    if catalogue is not None:
+        written = simulation.write_catalogue(catalogue, force=force)
+    else:
+        angles = simulation.angles(theta_i, "--theta-i"), simulation.angles(theta_o, "--theta-o")
+        truth = simulation.truth(model, set_ or [], masking)
+        written = simulation.write_simulation(out, truth, angles, noise=(noise, floor, seed), force=force)
+    typer.echo("\n".join(str(path) for path in written))
 
 
 @app.command()

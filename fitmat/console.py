@@ -25,24 +25,6 @@ from fitmat.report import rows
 from fitmat.uncertainty import laplace, sample
 
 
-def assignments(texts: Sequence[str], option: str) -> dict[str, np.ndarray]:
-    """`NAME=VALUE` texts as arrays; a value may be a comma-separated list, one number per channel.
-
-    Raises:
-        ModelError: a text is not of that form.
-    """
-    found = {}
-    for text in texts:
-        name, equals, values = text.partition("=")
-        try:
-            found[name.strip()] = np.array([float(v) for v in values.split(",")])
-        except ValueError as error:
-            raise ModelError(f"{option} {text!r}: expected NAME=NUMBER, for example ks=1.") from error
-        if not equals or not name.strip():
-            raise ModelError(f"{option} {text!r}: expected NAME=NUMBER, for example ks=1.")
-    return found
-
-
 def model_names(text: str) -> list[str]:
     """A comma-separated list of model names, checked, without repeats."""
     names = ["+".join(lobe_names(part)) for part in text.split(",") if part.strip()]
@@ -66,10 +48,9 @@ def study(
     keeps what was done and leaves the remaining models to Laplace's approximation.
     """
     posteriors: list[Posterior] = []
-    with Progress(
-        SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(),
-        console=Console(stderr=True), transient=True,
-    ) as bar:  # fmt: skip
+    screen = Console(stderr=True)
+    parts = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*parts, console=screen, transient=True, disable=not screen.is_terminal) as bar:
         for name in names:
             task = bar.add_task(f"fitting {name}", total=None)
             found = fit(measurements, name, **_options(name, names, fixed, masking))
@@ -164,13 +145,12 @@ def manual(name: str) -> None:
     for part in lobe_names(name):
         lobe = LOBES[part]
         out.print(f"[bold]{part}[/bold]\n")
-        out.print(inspect.cleandoc(lobe.shape.__doc__ or ""), markup=False, highlight=False)
+        for paragraph in inspect.cleandoc(lobe.shape.__doc__ or "").split("\n\n"):
+            out.print(" ".join(paragraph.split()) + "\n", markup=False, highlight=False)
         table = Table(box=None, pad_edge=False)
         for heading in ("parameter", "symbol", "range", "default", "channels", "meaning"):
             table.add_column(heading)
         for key, (p, default) in lobe.defaults().items():
             spread = "one each" if lobe.per_channel(key) else "shared"
             table.add_row(key, p.symbol, f"{p.lower:g} – {p.upper:g}", f"{default:g}", spread, p.doc)
-        out.print()
         out.print(table)
-        out.print()

@@ -146,7 +146,8 @@ def _refine(
         best = rebuilt(base, u)
         return Ends(vector(best), s, log_likelihood(best, data, s), settled & solved, steps)
 
-    return jax.vmap(one)(starts)
+    # One start after the other compiles in half the time and runs as fast on a few cores; an accelerator wants a batch.
+    return jax.lax.map(one, starts) if jax.default_backend() == "cpu" else jax.vmap(one)(starts)
 
 
 def _subspace(whole: Space, places: np.ndarray) -> Space:

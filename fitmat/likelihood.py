@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat._types import Directions, Samples, Scalar
-from fitmat.brdf import AbstractBRDF, evaluate_pairs
+from fitmat.brdf import AbstractBRDF, evaluate_pairs, padded_length
 from fitmat.instrument import Noise
 from fitmat.measurement import Measurements
 
@@ -29,7 +29,7 @@ _COEFFICIENTS = tuple((-1.0) ** k * 3.0 / (2 * k + 3) for k in range(12))
 
 
 class Data(eqx.Module):
-    """Samples as the likelihood sees them.
+    """Samples as the likelihood sees them; masked values and filling rows have weight 0.
 
     Attributes:
         wi: Directions to the light, (n, 3).
@@ -49,12 +49,25 @@ class Data(eqx.Module):
 
 
 def prepare(m: Measurements, noise: Noise) -> Data:
-    """Measurements and their noise, ready for the likelihood; rows with nothing valid are left out."""
+    """Measurements and their noise, ready for the likelihood.
+
+    Rows with nothing valid are left out; rows of weight 0 fill up to `padded_length`, so that files of similar size
+    share compiled programs.
+    """
     keep = m.valid.any(axis=1)
     m, sigma = m.rows(keep), noise.sigma[keep]
     kappa = m.wi[:, 2:3]
     parts = (m.wi, m.wo, m.value * kappa, sigma * kappa, kappa, m.valid.astype(float))
-    return Data(*(jnp.asarray(part) for part in parts))
+    extra = padded_length(len(kappa)) - len(kappa)
+    return Data(*(jnp.asarray(_padded(part, extra, fill)) for part, fill in zip(parts, _FILL, strict=True)))
+
+
+_FILL = ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 0.0, 1.0, 1.0, 0.0)
+# One row of Data that weighs nothing: both directions the normal, x = 0, noise = 1, κ = 1, weight 0.
+
+
+def _padded(part: np.ndarray, extra: int, fill: float | tuple[float, ...]) -> np.ndarray:
+    return np.concatenate([part, np.broadcast_to(np.asarray(fill), (extra, part.shape[1]))])
 
 
 def _shape(q2: Array) -> Array:

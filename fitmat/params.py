@@ -4,6 +4,7 @@ This room knows nothing of reflection and fits nothing.
 """
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any, Literal, TypeVar
 
 import equinox as eqx
@@ -185,6 +186,22 @@ def space(model: eqx.Module) -> Space:
     spread = [(e.param.lower, e.param.upper, e.param.scale == "log") for e in every for _ in range(e.size)]
     lower, upper, log = (np.array(column) for column in zip(*spread, strict=True))
     return Space(lower, upper, log)
+
+
+def assignments(texts: Sequence[str], option: str) -> dict[str, np.ndarray]:
+    """`NAME=VALUE` texts as arrays; a value may be a comma-separated list, one number per channel.
+
+    Raises:
+        ModelError: a text is not of that form.
+    """
+    found = {}
+    for text in texts:
+        name, _, values = text.partition("=")
+        try:
+            found[name.strip()] = np.array([float(v) for v in values.split(",")])
+        except ValueError as error:
+            raise ModelError(f"{option} {text!r}: expected NAME=NUMBER, for example ks=1.") from error
+    return found
 
 
 def check_range(model: eqx.Module) -> None:

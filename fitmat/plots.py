@@ -47,8 +47,8 @@ def plot_section(
     rows = section.rows[m.valid[section.rows, channel]]
     angle = np.rad2deg(signed_zenith(m.wi[rows], m.wo[rows]))
     measured = m.value[rows, channel]
-    fine = np.unique(np.r_[np.linspace(-89, 89, 357), np.rad2deg(section.theta_i) + np.linspace(-3, 3, 121)])
-    fine = fine[np.abs(fine) < 89.5]
+    fine = np.sort(np.r_[np.linspace(-89, 89, 357), np.rad2deg(section.theta_i) + np.linspace(-3, 3, 121)])
+    fine = np.clip(fine, -89.0, 89.0)
     for posterior, colour in zip(posteriors, FIT_COLOURS, strict=False):
         low, high = predictive_band(posterior, rows, seed=seed)[:, :, channel]
         ax.fill_between(angle, low, high, color=colour, alpha=0.18, lw=0)

@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from fitmat.brdf import AbstractBRDF, evaluate, evaluate_pairs
 from fitmat.geometry import from_angles
-from fitmat.likelihood import from_stabilised, prepare, stabilised
+from fitmat.likelihood import Data, from_stabilised, prepare, stabilised
 from fitmat.measurement import Measurements
 from fitmat.outcome import Fit
 from fitmat.params import with_vector
@@ -76,11 +76,11 @@ def predictive_band(posterior: Posterior, rows: np.ndarray, *, seed: int) -> Flo
     values, s = posterior.thinned(BAND_DRAWS)
     normal = np.random.default_rng(seed).standard_normal((len(s), *data.x.shape))
     parts = (jnp.asarray(values), jnp.asarray(s), jnp.asarray(normal))
-    return np.asarray(_band(fit.model, data, *parts))
+    return np.asarray(_band(fit.model, data, *parts))[:, : len(rows)]
 
 
 @eqx.filter_jit
-def _band(template: AbstractBRDF, data, values: Array, discrepancy: Array, normal: Array) -> Array:
+def _band(template: AbstractBRDF, data: Data, values: Array, discrepancy: Array, normal: Array) -> Array:
     def draw(value: Array, s: Array, e: Array) -> Array:
         x = evaluate_pairs(with_vector(template, value), data.wi, data.wo) * data.kappa
         return from_stabilised(stabilised(x, data.noise, s) + e, data.noise, s, x) / data.kappa

@@ -73,11 +73,15 @@ def parameters(posterior: Posterior) -> list[Quantity]:
 
 
 def _discrepancy(posterior: Posterior) -> Quantity:
-    draws = posterior.discrepancy
+    """s; where the best fit has none, its interval is one-sided."""
+    best, draws = posterior.fit.discrepancy, posterior.discrepancy
+    limits = np.quantile(draws, [0.025, 0.975]) if best > 0 else np.array([0.0, np.quantile(draws, 0.95)])
     words = "spread of ∛(f cosθ_i) that the model cannot explain"
-    interval = np.quantile(draws, [[0.025, 0.975]], axis=0)
-    best = np.array([posterior.fit.discrepancy])
-    return Quantity("discrepancy", "s", "sr^(-1/3)", words, best, np.array([draws.std()]), interval, False, "")
+    return Quantity(
+        *("discrepancy", "s", "sr^(-1/3)", words, np.array([best]), np.array([draws.std()]), limits[None]),
+        per_channel=False,
+        remark="",
+    )
 
 
 def _laplace_interval(posterior: Posterior, sd: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import ArrayLike
+from numpy.typing import ArrayLike
 
 from fitmat.brdf import AbstractBRDF, evaluate, model
 from fitmat.errors import FitmatError, ModelError, OutputError
@@ -61,6 +61,8 @@ def simulate(
         ModelError: an angle or a noise is out of range, or the names are not as many as the model's channels.
 
     Example:
+        >>> import jax
+        >>> jax.config.update("jax_enable_x64", True)
         >>> gloss = model("lambert+ggx", kd=0.3, alpha=0.1, eta=1.5)
         >>> simulate(gloss, [0.5, 1.0], [-0.5, 0.5, 1.0], relative_noise=0.02, absolute_noise=1e-3, seed=1).n_samples
         6
@@ -276,7 +278,7 @@ MATERIALS = (
         words="red paint in three channels: a diffuse colour under an uncoloured gloss"),
     Material("wax", BLINN, {"kd": 0.5, "ks": 0.06, "exponent": 40.0}, COARSE, 9,
         words="wax, with the broad lobe of Blinn–Phong"),
-    Material("lacquer", BLINN, {"kd": 0.2, "ks": 0.04, "exponent": 800.0}, SHARP, 10,
+    Material("lacquer", BLINN, {"kd": 0.2, "ks": 0.04, "exponent": 800.0}, SHARP, 17,
         words="lacquer, with the narrow lobe of Blinn–Phong, every 1° around the mirror directions"),
     Material("sparse", GGX, {"kd": 0.3, "ks": 1.0, "alpha": 0.3, "eta": 1.5}, SPARSE, 11,
         words="dull plastic measured in a hurry: 3 incidences, 17 angles each"),

@@ -58,6 +58,15 @@ def evaluate_pairs(model: AbstractBRDF, wi: Directions, wo: Directions) -> Sampl
     return jax.vmap(lambda a, b: jnp.atleast_1d(model(a, b)))(wi, wo)
 
 
+def padded_length(count: int) -> int:
+    """The array length to compile for: `count` rounded up by at most a quarter (at least 64).
+
+    JAX compiles a program for every array length; with four lengths an octave most files share theirs.
+    """
+    step = 2 ** max(4, int(count - 1).bit_length() - 3) if count > 1 else 16
+    return max(64, -(-count // step) * step)
+
+
 def evaluate(model: AbstractBRDF, wi: ArrayLike, wo: ArrayLike) -> Float[np.ndarray, "n c"]:
     """BRDF values in sr⁻¹ (no cosine) for n pairs of directions.
 
@@ -79,14 +88,16 @@ def evaluate(model: AbstractBRDF, wi: ArrayLike, wo: ArrayLike) -> Float[np.ndar
         array([[0.25]])
     """
     pair = [np.asarray(w, float) for w in (wi, wo)]
-    if pair[0].shape != pair[1].shape or pair[0].ndim != 2 or pair[0].shape[1] != 3:
-        raise ModelError(f"wi and wo have shapes {pair[0].shape} and {pair[1].shape}: expected the same (n, 3).")
+    if pair[0].shape != pair[1].shape or pair[0].ndim != 2 or pair[0].shape[1] != 3 or len(pair[0]) == 0:
+        raise ModelError(f"wi and wo have shapes {pair[0].shape} and {pair[1].shape}: expected the same (n, 3), n ≥ 1.")
     for label, w in zip(("wi", "wo"), pair, strict=True):
         length = np.linalg.norm(w, axis=1)
         if not np.allclose(length, 1.0, atol=1e-6):
             row = int(np.argmax(np.abs(length - 1.0)))
             raise ModelError(f"{label} row {row} has length {length[row]:.6g}: expected unit vectors.")
-    return np.asarray(_evaluate_jit(model, pair[0], pair[1]))
+    count = len(pair[0])
+    wi, wo = (np.pad(w, ((0, padded_length(count) - count), (0, 0)), mode="edge") for w in pair)
+    return np.asarray(_evaluate_jit(model, wi, wo))[:count]
 
 
 _evaluate_jit = eqx.filter_jit(evaluate_pairs)

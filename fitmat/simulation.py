@@ -1,0 +1,92 @@
+"""Options of `fitmat simulate` as text, and the files it writes; nothing is replaced unless asked.
+
+The physics and the noise are `synthetic`'s.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from fitmat import synthetic
+from fitmat.brdf import AbstractBRDF, model
+from fitmat.errors import ModelError, OutputError
+from fitmat.params import assignments
+
+
+def angles(text: str, option: str) -> np.ndarray:
+    """`FIRST:LAST:STEP` or a comma-separated list, in degrees.
+
+    Raises:
+        ModelError: the text is neither, or an angle is outside −90 to 90.
+    """
+    try:
+        if ":" in text:
+            first, last, step = (float(part) for part in text.split(":"))
+            found = np.arange(first, last + step / 2, step) if step > 0 else np.empty(0)
+        else:
+            found = np.array([float(part) for part in text.split(",")])
+    except ValueError as error:
+        raise ModelError(f"{option} {text!r}: expected a list 10,30,60 or FIRST:LAST:STEP in degrees.") from error
+    if found.size == 0 or not (np.abs(found) < 90).all():
+        raise ModelError(f"{option} {text!r}: expected angles between -90 and 90 degrees, in rising order.")
+    return found
+
+
+def truth(name: str | None, settings: Sequence[str], masking: str | None) -> AbstractBRDF:
+    """The model to simulate; lists of values make it a model of several channels.
+
+    Raises:
+        ModelError: no name, or what `brdf.model` refuses.
+    """
+    if name is None:
+        raise ModelError("name a model to simulate, for example lambert+ggx, or give --catalogue FOLDER.")
+    values = assignments(settings, "--set")
+    channels = max((v.size for v in values.values()), default=1)
+    return model(name, masking=masking, channels=channels, **{k: v[0] if v.size == 1 else v for k, v in values.items()})
+
+
+def write_simulation(
+    path: Path,
+    material: AbstractBRDF,
+    geometry: tuple[np.ndarray, np.ndarray],
+    *,
+    noise: tuple[float, float, int],
+    force: bool,
+) -> tuple[Path, ...]:
+    """Simulate and write one CSV file.
+
+    Args:
+        path: The file.
+        material: The true model.
+        geometry: theta_i and signed theta_o in degrees; every pair is measured.
+        noise: Relative noise, absolute noise in sr⁻¹, seed.
+        force: Replace an existing file.
+
+    Raises:
+        OutputError: the file exists and `force` is off, or it cannot be written.
+    """
+    _refuse_existing([path], force)
+    theta_i, theta_o = (np.deg2rad(part) for part in geometry)
+    relative, absolute, seed = noise
+    measured = synthetic.simulate(
+        material, theta_i, theta_o, relative_noise=relative, absolute_noise=absolute, seed=seed
+    )
+    described = f"simulated {material.name}; noise {relative:g} relative + {absolute:g} sr^-1, seed {seed}"
+    return (synthetic.write_csv(measured, path, [described]),)
+
+
+def write_catalogue(folder: Path, *, force: bool) -> tuple[Path, ...]:
+    """Write the catalogue of synthetic materials.
+
+    Raises:
+        OutputError: one of its files exists and `force` is off, or it cannot be written.
+    """
+    _refuse_existing([folder / f"{material.name}.csv" for material in synthetic.MATERIALS], force)
+    return synthetic.write_catalogue(folder)
+
+
+def _refuse_existing(paths: Sequence[Path], force: bool) -> None:
+    existing = [path for path in paths if path.exists()]
+    if existing and not force:
+        raise OutputError(f"{existing[0]} already exists; give another name, or --force to replace it.")
