@@ -31,7 +31,7 @@ def new_axes(width: float = 5.0, height: float = 3.6) -> Axes:
 
 
 def plot_section(
-    posteriors: Sequence[Posterior], section: Section, *, channel: int = 0, seed: int = 0, ax: Axes | None = None
+    posteriors: Sequence[Posterior], section: Section, *, channel: int = 0, ax: Axes | None = None
 ) -> Axes:
     """Measured points of one incidence angle with every fit and its 95 % predictive band.
 
@@ -39,7 +39,6 @@ def plot_section(
         posteriors: Of fits to the same measurements.
         section: From `prediction.sections`.
         channel: Which channel.
-        seed: Of the band's simulated noise.
         ax: Where to draw; a new figure if None.
     """
     ax = ax or new_axes()
@@ -49,18 +48,15 @@ def plot_section(
     measured = m.value[rows, channel]
     fine = np.sort(np.r_[np.linspace(-89, 89, 357), np.rad2deg(section.theta_i) + np.linspace(-3, 3, 121)])
     fine = np.clip(fine, -89.0, 89.0)
+    top = 0.0
     for posterior, colour in zip(posteriors, FIT_COLOURS, strict=False):
-        low, high = predictive_band(posterior, rows, seed=seed)[:, :, channel]
+        low, high = predictive_band(posterior, rows)[:, :, channel]
         ax.fill_between(angle, low, high, color=colour, alpha=0.18, lw=0)
         line = curve(posterior.fit, section.theta_i, np.deg2rad(fine))[:, channel]
+        top = max(top, float(line.max()))
         ax.plot(fine, line, color=colour, lw=1.3, label=posterior.fit.name)
     ax.plot(angle, measured, ".", color=BLACK, ms=3.5, label="measured")
-    positive = measured[measured > 0]
-    if positive.size and np.log10(positive.max() / positive.min()) > DECADES:
-        ax.set_yscale("log")
-        ax.set_ylim(positive.min() / 3, positive.max() * 4)
-    else:
-        ax.set_ylim(min(0.0, 1.2 * measured.min(initial=0.0)), 1.4 * measured.max(initial=1e-6))
+    _set_scale(ax, measured, top)
     ax.axvline(np.rad2deg(section.theta_i), color="0.75", lw=0.8, ls=":", zorder=0)
     ax.set(xlim=(-90, 90), xticks=[-60, -30, 0, 30, 60])
     ax.set_title(f"incidence {np.rad2deg(section.theta_i):.4g}°", fontsize=9)
@@ -68,6 +64,17 @@ def plot_section(
     ax.set_ylabel("BRDF / sr⁻¹", fontsize=8)
     ax.tick_params(labelsize=7)
     return ax
+
+
+def _set_scale(ax: Axes, measured: np.ndarray, top: float) -> None:
+    """Logarithmic where the data span decades; the fits may go past the data by a factor of 3, not more."""
+    positive = measured[measured > 0]
+    highest = max(float(measured.max(initial=1e-6)), min(top, 3 * float(measured.max(initial=1e-6))))
+    if positive.size and np.log10(positive.max() / positive.min()) > DECADES:
+        ax.set_yscale("log")
+        ax.set_ylim(positive.min() / 3, highest * 2)
+    else:
+        ax.set_ylim(min(0.0, 1.2 * measured.min(initial=0.0)), 1.15 * highest)
 
 
 def plot_residuals(fit: Fit, *, channel: int = 0, ax: Axes | None = None) -> Axes:

@@ -59,13 +59,15 @@ def curve(fit: Fit, theta_i: float, theta_o: Float[np.ndarray, " k"]) -> Float[n
     return evaluate(fit.model, wi, wo)
 
 
-def predictive_band(posterior: Posterior, rows: np.ndarray, *, seed: int) -> Float[np.ndarray, "2 k c"]:
+def predictive_band(posterior: Posterior, rows: np.ndarray) -> Float[np.ndarray, "2 k c"]:
     """95 % band of a new measurement at the given rows, in sr⁻¹: parameters, noise and discrepancy together.
+
+    Every posterior draw is paired with one standard normal quantile, shuffled, and the same for all rows: each row's
+    band is right and neighbouring rows do not jitter.
 
     Args:
         posterior: Of the fit.
         rows: Indices into the fit's measurements, each with at least one valid channel, (k,).
-        seed: Of the simulated noise.
 
     Returns:
         Lower and upper limit, (2, k, c).
@@ -74,8 +76,8 @@ def predictive_band(posterior: Posterior, rows: np.ndarray, *, seed: int) -> Flo
     noise = dataclasses.replace(fit.noise, sigma=fit.noise.sigma[rows])
     data = prepare(fit.measurements.rows(rows), noise)
     values, s = posterior.thinned(BAND_DRAWS)
-    normal = np.random.default_rng(seed).standard_normal((len(s), *data.x.shape))
-    parts = (jnp.asarray(values), jnp.asarray(s), jnp.asarray(normal))
+    levels = np.random.default_rng(0).permutation((np.arange(len(s)) + 0.5) / len(s))
+    parts = (jnp.asarray(values), jnp.asarray(s), jax.scipy.stats.norm.ppf(jnp.asarray(levels)))
     return np.asarray(_band(fit.model, data, *parts))[:, : len(rows)]
 
 
