@@ -161,7 +161,7 @@ def compare(one: Posterior, other: Posterior) -> Comparison:
     draws = [np.vstack([p.fit.values, p.thinned(DRAWS)[0]]) for p in (empirical, microfacet)]
     count = min(len(d) for d in draws)
     angles = jnp.asarray(_incidences(fits[0].measurements))
-    pairs = tuple(jnp.asarray(d[:count]) for d in draws)
+    pairs = jnp.asarray(draws[0][:count]), jnp.asarray(draws[1][:count])
     computed = _distances(fits[0].model, fits[1].model, pairs, angles)
     hemisphere, measured, cube, albedo_p, albedo_m = (np.asarray(part) for part in computed)
     gaps = albedo_p - albedo_m

@@ -54,7 +54,7 @@ def prepare(m: Measurements, noise: Noise) -> Data:
     Rows with nothing valid are left out; rows of weight 0 fill up to `padded_length`, so that files of similar size
     share compiled programs.
     """
-    keep = m.valid.any(axis=1)
+    keep = np.flatnonzero(m.valid.any(axis=1))
     m, sigma = m.rows(keep), noise.sigma[keep]
     kappa = m.wi[:, 2:3]
     parts = (m.wi, m.wo, m.value * kappa, sigma * kappa, kappa, m.valid.astype(float))

@@ -160,11 +160,10 @@ def conclude(
     best = with_vector(template, jnp.asarray(ends.values[k]))
     s = float(ends.discrepancy[k])
     free = free_places(template, held)
-    bounds = space(template).at_bound(ends.values[k])
-    inside = np.array([j for j in free if bounds[j] == 0], int)
+    bounds = space(template).at_bound(np.asarray(ends.values[k]))
     jacobian = np.asarray(_natural_jacobian(best, data, jnp.asarray(s)))
     information = jacobian.T @ jacobian
-    covariance, undetermined = _uncertainty(best, information, inside)
+    covariance, undetermined = _uncertainty(best, information, free)
     return Fit(
         name=template.name,
         model=best,
@@ -173,7 +172,7 @@ def conclude(
         data=data,
         discrepancy=s,
         held=held,
-        result=_outcome(bool(usable[k]), bool(ends.solved[k]), len(inside) < len(free), undetermined),
+        result=_outcome(bool(usable[k]), bool(ends.solved[k]), bool(bounds[free].any()), undetermined),
         steps=int(ends.steps[k]),
         n_starts=len(scores),
         n_starts_agreeing=int(np.count_nonzero(scores > scores[k] - AGREE)) if usable[k] else 0,
@@ -219,19 +218,28 @@ def inverse_information(information: np.ndarray, span: np.ndarray) -> np.ndarray
 
 
 def _uncertainty(
-    best: AbstractBRDF, information: np.ndarray, inside: np.ndarray
+    best: AbstractBRDF, information: np.ndarray, free: np.ndarray
 ) -> tuple[Float[np.ndarray, "p p"], tuple[str, ...]]:
-    """Covariance (JᵀJ)⁻¹ in physical parameters, and what is not determined."""
+    """Covariance (JᵀJ)⁻¹ in physical parameters, and what is not determined.
+
+    What is determined is judged with every free parameter released, those on a bound as well: a fit that slid along a
+    degenerate direction until it met a bound knows no more for that. Only where all are determined are the parameters
+    on a bound held there.
+    """
     coordinates, values = space(best), np.asarray(vector(best))
     span = coordinates.natural_upper - coordinates.natural_lower
-    natural = inverse_information(information[np.ix_(inside, inside)], span[inside])
-    sd = np.sqrt(np.diagonal(natural))
-    limit = np.where(coordinates.log, UNDETERMINED["log"], UNDETERMINED["linear"] * span)[inside]
-    loose = set(inside[~(sd <= limit)])
+    released = inverse_information(information[np.ix_(free, free)], span[free])
+    limit = np.where(coordinates.log, UNDETERMINED["log"], UNDETERMINED["linear"] * span)[free]
+    loose = set(free[~(np.sqrt(np.diagonal(released)) <= limit)])
+    on_bound = coordinates.at_bound(values) != 0
+    inside = free[~on_bound[free]]
+    if loose:
+        natural = released[np.ix_(~on_bound[free], ~on_bound[free])]
+    else:
+        natural = inverse_information(information[np.ix_(inside, inside)], span[inside])
     slope = np.where(coordinates.log, values, 1.0)[inside]
     covariance = np.zeros((len(values), len(values)))
     covariance[np.ix_(inside, inside)] = natural * np.outer(slope, slope)
-    on_bound = coordinates.at_bound(values) != 0
     covariance[on_bound, :] = covariance[:, on_bound] = np.nan
     names = tuple(e.name for e in entries(best) if loose & set(range(e.place.start, e.place.stop)))
     return covariance, names

@@ -66,7 +66,7 @@ def param(
 ) -> Any:
     """Declare a model field as a parameter; see `Param` for the arguments."""
     meta = Param(lower, upper, symbol, unit, scale, per_channel, weight, starts, doc)
-    extra = {} if default is None else {"default": default}
+    extra: dict[str, Any] = {} if default is None else {"default": default}
     return eqx.field(converter=as_parameter, metadata={"param": meta}, **extra)
 
 
@@ -171,7 +171,7 @@ class Space:
     def from_free(self, free: Array) -> Array:
         """Free → physical, always within the bounds."""
         span = self.natural_upper - self.natural_lower
-        return self.physical(self.natural_lower + span * (1.0 + jnp.sin(free)) / 2.0)
+        return self.physical(jnp.asarray(self.natural_lower) + span * (1.0 + jnp.sin(free)) / 2.0)
 
     def at_bound(self, values: np.ndarray) -> np.ndarray:
         """Which physical values sit on a bound: −1 lower, +1 upper, 0 inside."""

@@ -6,6 +6,7 @@ Computes nothing that another room could; the only importer of matplotlib.
 from collections.abc import Sequence
 
 import corner
+import jax.numpy as jnp
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -80,7 +81,7 @@ def _set_scale(ax: Axes, measured: np.ndarray, top: float) -> None:
 def plot_residuals(fit: Fit, *, channel: int = 0, ax: Axes | None = None) -> Axes:
     """Standardised residuals of one channel against theta_o, one colour per incidence angle."""
     ax = ax or new_axes()
-    z = np.asarray(residuals(fit.model, fit.data, np.asarray(fit.discrepancy)))[:, channel]
+    z = np.asarray(residuals(fit.model, fit.data, jnp.asarray(fit.discrepancy)))[:, channel]
     used = np.asarray(fit.data.weight)[:, channel] > 0
     wi, wo = np.asarray(fit.data.wi), np.asarray(fit.data.wo)
     theta_i = np.rad2deg(np.arccos(np.clip(wi[:, 2], -1, 1)))

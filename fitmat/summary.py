@@ -5,6 +5,7 @@ Takes all numbers from a posterior; formats nothing.
 
 import dataclasses
 
+import jax.numpy as jnp
 import numpy as np
 
 from fitmat.fresnel import eta_from_f0, f0_from_eta
@@ -113,10 +114,10 @@ def derived(posterior: Posterior) -> list[Quantity]:
         reflectance = ((eta - 1) ** 2 + square) / ((eta + 1) ** 2 + square)
         found.append(("f0", "F0", "reflectance at normal incidence", reflectance, "eta"))
     elif "eta" in names:
-        reflectance = np.asarray(f0_from_eta(of("eta")))
+        reflectance = np.asarray(f0_from_eta(jnp.asarray(of("eta"))))
         found.append(("f0", "F0", "reflectance at normal incidence", reflectance, "eta"))
     elif "f0" in names:
-        index = np.asarray(eta_from_f0(of("f0")))
+        index = np.asarray(eta_from_f0(jnp.asarray(of("f0"))))
         found.append(("eta", "η", "index of the dielectric with that F0", index, "f0"))
     if "alpha" in names:
         alpha = of("alpha")
@@ -125,10 +126,11 @@ def derived(posterior: Posterior) -> list[Quantity]:
     if "exponent" in names:
         width = np.sqrt(2 / (of("exponent") + 2))
         found.append(("alpha", "α", "slope of the microfacet lobe as wide, √(2/(n+2))", width, "exponent"))
-    return [_from_draws(*item, posterior) for item in found]
+    return [_from_draws(item, posterior) for item in found]
 
 
-def _from_draws(name: str, symbol: str, doc: str, draws: np.ndarray, source: str, posterior: Posterior) -> Quantity:
+def _from_draws(item: tuple[str, str, str, np.ndarray, str], posterior: Posterior) -> Quantity:
+    name, symbol, doc, draws, source = item
     origin = next(q for q in parameters(posterior) if q.name == source)
     ci95 = np.quantile(draws[1:], [0.025, 0.975], axis=0).T
     sd = np.where(np.isfinite(origin.sd), draws[1:].std(axis=0), np.nan)

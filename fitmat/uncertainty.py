@@ -141,7 +141,7 @@ def log_posterior(fit: Fit) -> Callable[[np.ndarray], np.ndarray]:
     arrays, static = eqx.partition((fit.model, fit.data), eqx.is_array)
 
     def call(coordinates: np.ndarray) -> np.ndarray:
-        return np.asarray(_log_posterior(arrays, static, free, coordinates))
+        return np.asarray(_log_posterior(arrays, static, free, jnp.asarray(coordinates)))
 
     return call
 
@@ -212,7 +212,7 @@ def _discrepancy_sd(fit: Fit) -> float:
     if fit.discrepancy > 0:
         moves = np.concatenate([moves, fit.discrepancy * 2.0 ** np.arange(-8, 3)])
     moves.sort()
-    drop = fit.log_likelihood - np.asarray(_over_discrepancy(fit.model, fit.data, fit.discrepancy + moves))
+    drop = fit.log_likelihood - np.asarray(_over_discrepancy(fit.model, fit.data, jnp.asarray(fit.discrepancy + moves)))
     crossing = np.flatnonzero(drop > 0.5)
     if len(crossing) == 0:
         return float(moves[-1])

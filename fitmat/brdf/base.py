@@ -18,7 +18,10 @@ from fitmat.errors import ModelError
 class AbstractBRDF(eqx.Module):
     """A reflectance model; its `param` fields are what can be fitted."""
 
-    name: eqx.AbstractVar[str]
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """What `fitmat.model` builds it from."""
 
     @abstractmethod
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
@@ -97,7 +100,7 @@ def evaluate(model: AbstractBRDF, wi: ArrayLike, wo: ArrayLike) -> Float[np.ndar
             raise ModelError(f"{label} row {row} has length {length[row]:.6g}: expected unit vectors.")
     count = len(pair[0])
     wi, wo = (np.pad(w, ((0, padded_length(count) - count), (0, 0)), mode="edge") for w in pair)
-    return np.asarray(_evaluate_jit(model, wi, wo))[:count]
+    return np.asarray(_evaluate_jit(model, jnp.asarray(wi), jnp.asarray(wo)))[:count]
 
 
 _evaluate_jit = eqx.filter_jit(evaluate_pairs)

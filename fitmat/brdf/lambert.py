@@ -22,10 +22,14 @@ class Lambert(AbstractBRDF):
     Example: `fm.model("lambert", kd=0.5)`
     """
 
-    name = "lambert"
     kd: Spectrum = param(
         0.0, 1.0, symbol="k_d", per_channel=True, weight=True, default=0.5, doc="diffuse albedo"
     )  # fmt: skip
+
+    @property
+    def name(self) -> str:
+        """`lambert`."""
+        return "lambert"
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """kd/π."""

@@ -52,9 +52,13 @@ class Phong(AbstractBRDF):
     Example: `fm.model("lambert+phong", kd=0.3, ks=0.1, exponent=40)`
     """
 
-    name = "phong"
     ks: Spectrum = _ks()
     exponent: Scalar = _exponent()
+
+    @property
+    def name(self) -> str:
+        """`phong`."""
+        return "phong"
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """ks (n+2)/(2π) max(r·ω_o, 0)ⁿ."""
@@ -84,9 +88,13 @@ class BlinnPhong(AbstractBRDF):
     Example: `fm.model("lambert+blinn-phong", kd=0.3, ks=0.05, exponent=100)`
     """
 
-    name = "blinn-phong"
     ks: Spectrum = _ks()
     exponent: Scalar = _exponent()
+
+    @property
+    def name(self) -> str:
+        """`blinn-phong`."""
+        return "blinn-phong"
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """ks (n+8)/(8π) c_hⁿ."""
@@ -115,9 +123,13 @@ class BlinnPhongExact(AbstractBRDF):
     Example: `fm.model("lambert+blinn-phong-exact", kd=0.3, ks=0.05, exponent=100)`
     """
 
-    name = "blinn-phong-exact"
     ks: Spectrum = _ks()
     exponent: Scalar = _exponent()
+
+    @property
+    def name(self) -> str:
+        """`blinn-phong-exact`."""
+        return "blinn-phong-exact"
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """ks (n+2)(n+4)/(8π(2^(−n/2) + n)) c_hⁿ."""

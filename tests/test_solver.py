@@ -1,0 +1,157 @@
+"""The least-squares core against NIST's certified results, and its promises: units, caps, tall problems."""
+
+import dataclasses
+from pathlib import Path
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+import pytest
+from jaxtyping import Array
+from oracles.nist_strd import DANWOOD, FORMULAS, MISRA1A, Problem, read_problem
+
+from fitmat import solver
+from fitmat.solver import Minimum, least_squares
+
+DIGITS = 6.0
+"""Correct digits asked for: what NIST calls a good result; half of what float64 Jacobians of these problems allow."""
+
+SAME = 1e-9
+"""Relative; two routes to one minimum, each converged to a step below 1e-12 of the parameter's own scale."""
+
+FAR_FAILURES = {"BoxBOD", "MGH10", "MGH17"}
+"""Problems whose far start leads Levenberg–Marquardt to a plateau or another minimum; NIST calls all three hard."""
+
+NO_NOISE = {"Lanczos1"}
+"""Generated without noise: its residuals, 1e-13, are the rounding of the data, and so are its standard errors."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Score:
+    """Correct digits of the worst parameter and of the worst standard error, and the steps taken."""
+
+    parameters: float
+    errors: float
+    steps: int
+
+
+@eqx.filter_jit
+def _solve(problem: Problem, x: Array, y: Array, x0: Array, max_steps: Array) -> tuple[Minimum, Array]:
+    """The minimum and the standard deviations √diag(s²(JᵀJ)⁻¹)."""
+
+    def residual(b: Array, _: None) -> Array:
+        return problem.formula(b, x) - y
+
+    end = least_squares(residual, x0, tolerance=1e-12, max_steps=max_steps)
+    r, inverse = residual(end.x, None), jnp.linalg.inv(jnp.linalg.qr(jax.jacfwd(residual)(end.x, None), mode="r"))
+    return end, jnp.sqrt(r @ r / (len(y) - len(x0)) * jnp.sum(inverse**2, axis=1))
+
+
+def solved(problem: Problem, x0: np.ndarray, max_steps: int = 3000) -> tuple[Minimum, np.ndarray]:
+    end, sd = _solve(problem, jnp.asarray(problem.x), jnp.asarray(problem.y), jnp.asarray(x0), jnp.asarray(max_steps))
+    return end, np.asarray(sd)
+
+
+def digits(found: np.ndarray, certified: np.ndarray) -> float:
+    """NIST's log relative error of the worst entry, at most the 11 digits that are certified; 0 for nonsense."""
+    error = np.max(np.abs(found - certified) / np.abs(certified))
+    return float(np.clip(-np.log10(max(error, 1e-11)), 0.0, 11.0)) if np.isfinite(error) else 0.0
+
+
+def score(problem: Problem, start: int) -> Score:
+    end, sd = solved(problem, problem.starts[start])
+    return Score(digits(np.asarray(end.x), problem.certified), digits(sd, problem.sd), int(end.steps))
+
+
+@pytest.fixture(scope="module")
+def scores(shared_data: Path) -> dict[str, tuple[Score, Score]]:
+    """All 27 problems from the far and the near start."""
+    folder = shared_data / "nist-strd"
+    if not folder.is_dir():
+        pytest.skip(f"no NIST datasets at {folder}: download the .dat files from www.itl.nist.gov/div898/strd/nls")
+    problems = [read_problem(folder / f"{name}.dat") for name in FORMULAS]
+    found = {problem.name: (score(problem, 0), score(problem, 1)) for problem in problems}
+    print("\nproblem    far: digits, sd, steps   near: digits, sd, steps")
+    for name, pair in found.items():
+        print(f"{name:10}", *(f"{s.parameters:10.1f} {s.errors:5.1f} {s.steps:6}" for s in pair))
+    return found
+
+
+def test_nist_from_the_near_start(scores: dict[str, tuple[Score, Score]]) -> None:
+    assert len(scores) == 27
+    assert {name: near for name, (_, near) in scores.items() if near.parameters < DIGITS} == {}
+
+
+def test_nist_from_the_far_start(scores: dict[str, tuple[Score, Score]]) -> None:
+    assert {name for name, (far, _) in scores.items() if far.parameters < DIGITS} == FAR_FAILURES
+
+
+def test_nist_standard_errors(scores: dict[str, tuple[Score, Score]]) -> None:
+    assert {name for name, (_, near) in scores.items() if near.errors < DIGITS} == NO_NOISE
+
+
+@pytest.mark.parametrize("start", [0, 1])
+@pytest.mark.parametrize("problem", [MISRA1A, DANWOOD], ids=lambda p: p.name)
+def test_certified_values_without_shared_data(problem: Problem, start: int) -> None:
+    found = score(problem, start)
+    assert found.parameters >= DIGITS
+    assert found.errors >= DIGITS
+
+
+def test_digits_notice_a_wrong_parameter() -> None:
+    assert digits(MISRA1A.certified * [1.0, 1.0 + 1e-5], MISRA1A.certified) == pytest.approx(5.0, abs=1e-3)
+    assert digits(np.array([np.nan, 1.0]), MISRA1A.certified) == 0.0
+    assert digits(MISRA1A.certified, MISRA1A.certified) == 11.0
+
+
+def test_outcome_says_whether_the_steps_sufficed() -> None:
+    end, _ = solved(MISRA1A, MISRA1A.starts[0])
+    assert end.result == optx.RESULTS.successful
+    cut, _ = solved(MISRA1A, MISRA1A.starts[0], max_steps=3)
+    assert cut.result == optx.RESULTS.nonlinear_max_steps_reached
+    assert int(cut.steps) == 3
+    assert np.isfinite(cut.x).all()
+
+
+@pytest.mark.parametrize("max_steps", [4, 3000])
+@pytest.mark.parametrize(("of_x", "of_residual"), [([1e6, 1e-6], 1e6), ([1e-6, 1e6], 1e-6)])
+def test_units_do_not_matter(of_x: list[float], of_residual: float, max_steps: int) -> None:
+    """Other units of the parameters and the residuals: the same path (after 4 steps) to the same minimum."""
+    units = np.array(of_x)
+
+    def formula(b: Array, x: Array) -> Array:
+        return of_residual * MISRA1A.formula(b / units, x)
+
+    x0 = MISRA1A.starts[0]
+    other = dataclasses.replace(MISRA1A, formula=formula, y=of_residual * MISRA1A.y)
+    plain, scaled = solved(MISRA1A, x0, max_steps)[0], solved(other, x0 * units, max_steps)[0]
+    np.testing.assert_allclose(scaled.x / units, plain.x, rtol=SAME)
+
+
+def test_tall_problems_take_the_normal_equations_to_the_same_minimum(monkeypatch: pytest.MonkeyPatch) -> None:
+    """40 copies of the data have the minimum of one."""
+    x, y = jnp.tile(jnp.asarray(MISRA1A.x), 40), jnp.tile(jnp.asarray(MISRA1A.y), 40)
+    x0 = jnp.asarray(MISRA1A.starts[0])
+
+    def residual(b: Array, _: None) -> Array:
+        return MISRA1A.formula(b, x) - y
+
+    def linear_solvers(limit: int) -> tuple[Minimum, str]:
+        monkeypatch.setattr(solver, "TALL", limit)
+        program = str(jax.make_jaxpr(lambda b: least_squares(residual, b, tolerance=1e-12).x)(x0))
+        return least_squares(residual, x0, tolerance=1e-12), program
+
+    by_qr, qr = linear_solvers(len(y) + 1)
+    by_normal, normal = linear_solvers(len(y))
+    assert "cholesky" in normal
+    assert "cholesky" not in qr
+    np.testing.assert_allclose(by_normal.x, by_qr.x, rtol=SAME)
+    assert digits(np.asarray(by_normal.x), MISRA1A.certified) >= DIGITS
+
+
+def test_a_start_at_the_minimum_stays() -> None:
+    """Zero residuals and a parameter that nothing depends on would divide by zero if taken as units."""
+    end = least_squares(lambda b, _: jnp.array([b[0] - 2.0, 3.0 * (b[0] - 2.0)]), jnp.array([2.0, 5.0]))
+    np.testing.assert_array_equal(end.x, [2.0, 5.0])
