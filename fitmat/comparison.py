@@ -31,6 +31,9 @@ EMPIRICAL = ("phong", "blinn-phong", "blinn-phong-exact")
 CLOSE, SIMILAR = 0.1, 0.3
 """Hemisphere distances up to which the verdict says "hardly differ" and "differ moderately"."""
 
+ALBEDO_ERROR = 2e-3
+"""Albedos above 1 by more than the quadrature's error are called impossible."""
+
 STRONG_EVIDENCE = 10.0
 """ΔBIC from which the data clearly prefer one model (Kass & Raftery 1995: "very strong")."""
 
@@ -108,6 +111,10 @@ class Comparison:
             _evidence(self.delta_bic, names),
             f"{names[0]} {self.empirical.fit.adequacy}; {names[1]} {self.microfacet.fit.adequacy}.",
         ]
+        for name, albedo in zip(names, (self.albedo_empirical[1], self.albedo_microfacet[1]), strict=True):
+            if albedo.max() > 1.0 + ALBEDO_ERROR:
+                at = np.rad2deg(self.albedo_theta_i[np.argmax(albedo)])
+                sentences.append(f"{name} reflects more light than it receives (albedo {albedo.max():.2f} at {at:.0f}°).")
         unsure = [p.fit for p in (self.empirical, self.microfacet) if p.fit.result in ("max_steps", "nonfinite")]
         sentences += [f"Do not rely on this match: the fit of {f.name} ended {f.result}." for f in unsure]
         return " ".join(sentences)
@@ -147,7 +154,8 @@ def compare(one: Posterior, other: Posterior) -> Comparison:
         A `Comparison`; intervals come from independent draws of both posteriors.
 
     Raises:
-        FitmatError: the two are not one empirical and one microfacet model, or were fitted to different data.
+        FitmatError: the two are not one empirical and one microfacet model, were fitted to different data, or are not
+            finite.
     """
     empirical, microfacet = (one, other) if is_empirical(one.fit.name) else (other, one)
     if not (is_empirical(empirical.fit.name) and is_microfacet(microfacet.fit.name)):
@@ -155,6 +163,9 @@ def compare(one: Posterior, other: Posterior) -> Comparison:
             f"compare needs one empirical ({', '.join(EMPIRICAL)}) and one microfacet model, "
             f"got {one.fit.name} and {other.fit.name}."
         )
+    for fit in (one.fit, other.fit):
+        if not fit.finite:
+            raise FitmatError(f"{fit.name}: the fit ended {fit.result}, there is nothing to compare; check the data.")
     if one.fit.measurements is not other.fit.measurements:
         raise FitmatError("compare needs two fits to the same Measurements object.")
     fits = empirical.fit, microfacet.fit

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat.brdf import AbstractBRDF
+from fitmat.display import html_table, text_table, with_error
 from fitmat.instrument import Noise
 from fitmat.likelihood import Data, noise_scale, residuals
 from fitmat.measurement import Measurements
@@ -25,6 +26,9 @@ AGREE = 0.1
 UNDETERMINED = {"log": 1.0, "linear": 0.3}
 """A parameter whose standard deviation exceeds this (in ln p, or as a fraction of its range) is not determined."""
 
+
+FOLLOWS, MISSES = 0.5, 2.0
+"""Ratios of discrepancy to noise up to which a model follows the data, and from which it is inadequate."""
 
 RESULTS = {
     "converged": "Converged.",
@@ -56,7 +60,7 @@ class Fit:
         n_starts: How many starts were refined.
         n_starts_agreeing: How many of them found the best optimum.
         log_likelihood: At the optimum.
-        information: JᵀJ of the residuals in natural coordinates (logarithm where the scale is log), (p, p).
+        information: Of the natural coordinates (logarithm where the scale is log), (p, p).
         covariance: Of all physical parameters, (p, p); 0 for fixed ones, NaN for those on a bound.
         undetermined: Names of parameters that these data do not determine.
     """
@@ -100,7 +104,7 @@ class Fit:
     @property
     def misfit_ratio(self) -> float:
         """Discrepancy over measurement noise for the typical sample: the adequacy of the model."""
-        return self.discrepancy / float(noise_scale(self.data))
+        return self.discrepancy / max(float(noise_scale(self.data)), 1e-300)
 
     @property
     def adequacy(self) -> str:
@@ -110,11 +114,33 @@ class Fit:
             return "cannot be judged: nothing finite was found"
         if not self.noise.known:
             return "adequacy unknown: the noise is not known"
-        if ratio < 0.5:
+        if ratio < FOLLOWS:
             return "follows the data within the measurement noise"
-        if ratio < 2.0:
+        if ratio < MISSES:
             return f"follows the data to about the measurement noise (misfit {ratio:.1f} × noise)"
         return f"inadequate: misses the data by {ratio:.0f} × the measurement noise"
+
+    def _rows(self) -> list[tuple[str, str, str]]:
+        sd = np.sqrt(np.diagonal(self.covariance))
+        channels = self.measurements.channels
+        named = [
+            (f"{e.name} {channels[k]}" if e.shape and len(channels) > 1 else e.name, e.param.symbol, e.place.start + k)
+            for e in self.entries
+            for k in range(e.size)
+        ]
+        return [(name, symbol, with_error(self.values[at], sd[at])) for name, symbol, at in named]
+
+    def __str__(self) -> str:
+        """The outcome and every parameter with its standard deviation."""
+        return text_table(self._caption, self._rows())
+
+    def _repr_html_(self) -> str:
+        return html_table(self._caption, ("parameter", "symbol", "value ± sd"), self._rows())
+
+    @property
+    def _caption(self) -> str:
+        agreeing = f"{self.n_starts_agreeing} of {self.n_starts} starts agree"
+        return f"{self.name}: {self.result}, {agreeing}; {self.adequacy}."
 
     @property
     def aicc(self) -> float:
@@ -161,8 +187,7 @@ def conclude(
     s = float(ends.discrepancy[k])
     free = free_places(template, held)
     bounds = space(template).at_bound(np.asarray(ends.values[k]))
-    jacobian = np.asarray(_natural_jacobian(best, data, jnp.asarray(s)))
-    information = jacobian.T @ jacobian
+    information = _information(best, data, s, free)
     covariance, undetermined = _uncertainty(best, information, free)
     return Fit(
         name=template.name,
@@ -194,33 +219,54 @@ def _outcome(usable: bool, solved: bool, on_bound: bool, undetermined: tuple[str
 
 
 @eqx.filter_jit
-def _natural_jacobian(best: AbstractBRDF, data: Data, s: Array) -> Array:
-    """Jacobian of the residuals in natural coordinates, (n·c, p)."""
+def _curvatures(best: AbstractBRDF, data: Data, s: Array) -> tuple[Array, Array]:
+    """Expected and observed information in natural coordinates: JᵀJ, and the Hessian of ½Σ residual², (p, p) each."""
     coordinates = space(best)
 
     def residual(t: Array) -> Array:
         return residuals(with_vector(best, coordinates.physical(t)), data, s).ravel()
 
-    return jax.jacfwd(residual)(coordinates.natural(vector(best)))
+    def cost(t: Array) -> Array:
+        return 0.5 * jnp.sum(residual(t) ** 2)
+
+    at = coordinates.natural(vector(best))
+    jacobian = jax.jacfwd(residual)(at)
+    return jacobian.T @ jacobian, jax.jacfwd(jax.grad(cost))(at)
+
+
+def _information(best: AbstractBRDF, data: Data, s: float, free: np.ndarray) -> Float[np.ndarray, "p p"]:
+    """The expected information where the model follows the data, else the observed one if it is positive definite.
+
+    For a model that is right they differ by chance only. For one that is not, the residuals are large and their
+    curvature counts: it may determine what the Jacobian alone does not (Efron & Hinkley 1978).
+    """
+    expected, observed = (np.asarray(part) for part in _curvatures(best, data, jnp.asarray(s)))
+    if s < FOLLOWS * float(noise_scale(data)):
+        return expected
+    part = observed[np.ix_(free, free)]
+    scale = np.sqrt(np.abs(np.diagonal(part)) + 1e-300)
+    positive = np.isfinite(part).all() and np.linalg.eigvalsh(part / np.outer(scale, scale)).min(initial=1.0) > 1e-9
+    return observed if positive else expected
 
 
 def inverse_information(information: np.ndarray, span: np.ndarray) -> np.ndarray:
     """The inverse of an information matrix, huge but finite along directions that the data do not determine.
 
     Args:
-        information: JᵀJ, (k, k), natural coordinates.
+        information: In natural coordinates, (k, k).
         span: Widths of the bounds in the same coordinates, (k,); they set the scale of "huge".
     """
     scaled = np.nan_to_num(information * np.outer(span, span))
-    eigenvalues, vectors = np.linalg.eigh(scaled)
-    floor = max(1e-14 * float(eigenvalues.max(initial=0.0)), 1e-12)
-    return (vectors / np.maximum(eigenvalues, floor)) @ vectors.T * np.outer(span, span)
+    unit = np.sqrt(np.maximum(np.diagonal(scaled), 1e-12))
+    eigenvalues, vectors = np.linalg.eigh(scaled / np.outer(unit, unit))
+    size = span / unit
+    return (vectors / np.maximum(eigenvalues, 1e-14)) @ vectors.T * np.outer(size, size)
 
 
 def _uncertainty(
     best: AbstractBRDF, information: np.ndarray, free: np.ndarray
 ) -> tuple[Float[np.ndarray, "p p"], tuple[str, ...]]:
-    """Covariance (JᵀJ)⁻¹ in physical parameters, and what is not determined.
+    """The covariance in physical parameters, and what is not determined.
 
     What is determined is judged with every free parameter released, those on a bound as well: a fit that slid along a
     degenerate direction until it met a bound knows no more for that. Only where all are determined are the parameters

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from fitmat.display import html_table, text_table, with_error
 from fitmat.outcome import Fit
 
 ENOUGH_TAU = 50
@@ -87,6 +88,27 @@ class Posterior:
     def usable(self) -> bool:
         """Whether intervals may be taken from these draws."""
         return self.verdict != "unusable"
+
+    def _rows(self) -> list[tuple[str, str, str]]:
+        channels = self.fit.measurements.channels
+        sd, interval = self.sd(), self.interval()
+        return [
+            (
+                f"{e.name} {channels[k]}" if e.shape and len(channels) > 1 else e.name,
+                with_error(self.fit.values[e.place.start + k], sd[e.place.start + k]),
+                " – ".join(f"{limit:.4g}" for limit in interval[e.place.start + k]),
+            )
+            for e in self.fit.entries
+            for k in range(e.size)
+        ]
+
+    def __str__(self) -> str:
+        """The verdict and every parameter with its standard deviation and 95 % interval."""
+        return text_table(f"{self.fit.name}: posterior {self.verdict}.", self._rows())
+
+    def _repr_html_(self) -> str:
+        caption = f"{self.fit.name}: posterior {self.verdict}."
+        return html_table(caption, ("parameter", "value ± sd", "95 % interval"), self._rows())
 
     def sd(self) -> Float[np.ndarray, " p"]:
         """Standard deviation of each parameter."""
