@@ -23,9 +23,23 @@ from fitmat.brdf import AbstractBRDF, evaluate_pairs, padded_length
 from fitmat.instrument import Noise
 from fitmat.measurement import Measurements
 
-_SERIES = 0.05
-# Below this q² the closed form loses digits to cancellation; the series is exact to 1e-15 there.
-_COEFFICIENTS = tuple((-1.0) ** k * 3.0 / (2 * k + 3) for k in range(12))
+
+def _near_shape() -> np.ndarray:
+    """Coefficients, highest first, of 3(q − atan q)/q³ as a polynomial in 2q² − 1 for 0 ≤ q² ≤ 1, exact to 1e-15.
+
+    Interpolated at Chebyshev nodes; the values come from the formula, and from its power series where that cancels.
+    """
+
+    def exact(t: np.ndarray) -> np.ndarray:
+        q = np.sqrt(np.maximum(t, 0.02))
+        series = np.polynomial.polynomial.polyval(t, [(-1.0) ** k * 3.0 / (2 * k + 3) for k in range(12)])
+        return np.where(t < 0.02, series, 3.0 * (q - np.arctan(q)) / q**3)
+
+    fitted = np.polynomial.Chebyshev.interpolate(exact, 20, domain=[0.0, 1.0])
+    return np.polynomial.chebyshev.cheb2poly(fitted.coef)[::-1]
+
+
+_NEAR = _near_shape()
 
 
 class Data(eqx.Module):
@@ -71,43 +85,61 @@ def _padded(part: np.ndarray, extra: int, fill: float | tuple[float, ...]) -> np
 
 
 def _shape(q2: Array) -> Array:
-    """3(q − atan q)/q³ as a function of q²."""
-    small = q2 < _SERIES
-    series = jnp.polyval(jnp.array(_COEFFICIENTS[::-1]), jnp.where(small, q2, 0.0))
-    q = jnp.sqrt(jnp.where(small, 1.0, q2))
-    return jnp.where(small, series, 3.0 * (q - jnp.arctan(q)) / q**3)
+    """3(q − atan q)/q³ as a function of q²; for q > 1 by atan q = π/2 − atan(1/q), with the same polynomial."""
+    near = q2 <= 1.0
+    v2 = 1.0 / jnp.where(near, 1.0, q2)
+    v = jnp.sqrt(v2)
+    polynomial = jnp.polyval(jnp.asarray(_NEAR), 2.0 * jnp.where(near, q2, v2) - 1.0)
+    far = 3.0 * v**3 * (1.0 / v - jnp.pi / 2.0 + v * (1.0 - v2 * polynomial / 3.0))
+    return jnp.where(near, polynomial, far)
+
+
+def _two_thirds(x: Array) -> Array:
+    """|x|^(2/3), by exp and log: several times faster than a cube root; 0 at 0."""
+    return jnp.exp(jnp.log(jnp.maximum(x * x, 1e-300)) / 3.0)
 
 
 def spread(x: Array, noise: Array, s: Array) -> Array:
     """a + 3 s |x|^(2/3): the standard deviation of a measurement of x."""
-    return noise + 3.0 * s * jnp.cbrt(x) ** 2
+    return noise + 3.0 * s * _two_thirds(x)
 
 
 @jax.custom_jvp
 def stabilised(x: Array, noise: Array, s: Array) -> Array:
     """z(x), the module's transform; its derivative in x is 1/(a + 3 s |x|^(2/3)), finite everywhere."""
-    return x / noise * _shape(3.0 * s * jnp.cbrt(x) ** 2 / noise)
+    return x / noise * _shape(3.0 * s * _two_thirds(x) / noise)
 
 
 @stabilised.defjvp
 def _stabilised_jvp(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
     x, noise, s = primals
     x_dot, _, s_dot = tangents
-    fixed = jnp.cbrt(x) ** 2
+    fixed = _two_thirds(x)
     value, from_s = jax.jvp(lambda t: x / noise * _shape(3.0 * t * fixed / noise), (s,), (s_dot,))
     return value, x_dot / spread(x, noise, s) + from_s
 
 
-def from_stabilised(z: Array, noise: Array, s: Array, guess: Array) -> Array:
-    """x with z(x) = z, by Newton's method in ∛x from `guess`; for predictive bands."""
+def from_stabilised(z: Array, noise: Array, s: Array) -> Array:
+    """x with z(x) = z, by bisection in ∛|x|; for predictive bands.
 
-    def step(_: int, u: Array) -> Array:
-        slope = 3.0 * u**2 / spread(u**3, noise, s)
-        move = (z - stabilised(u**3, noise, s)) / jnp.maximum(slope, 1e-3 / jnp.cbrt(noise))
-        return u + jnp.clip(move, -limit, limit)
+    Since a + 3 s u² is at least its larger part and at most twice that, ∛|x| lies between the larger of ∛(a|z|) and
+    s|z|, and ∛(2a|z|) + 2s|z|.
+    """
+    size = jnp.abs(z)
 
-    limit = jnp.cbrt(jnp.abs(guess) + noise)
-    return jax.lax.fori_loop(0, 40, step, jnp.cbrt(guess)) ** 3
+    def halve(_: int, bracket: tuple[Array, Array]) -> tuple[Array, Array]:
+        low, high = bracket
+        middle = 0.5 * (low + high)
+        below = stabilised(middle**3, noise, s) < size
+        return jnp.where(below, middle, low), jnp.where(below, high, middle)
+
+    begin = jnp.maximum(jnp.cbrt(noise * size), s * size), jnp.cbrt(2.0 * noise * size) + 2.0 * s * size
+    low, high = jax.lax.fori_loop(0, HALVINGS, halve, begin)
+    return jnp.sign(z) * (0.5 * (low + high)) ** 3
+
+
+HALVINGS = 50
+"""Bisections of a bracket whose ends are within a factor of 3.3 of each other: ∛x to 15 digits."""
 
 
 def residuals(model: AbstractBRDF, data: Data, s: Scalar) -> Samples:
@@ -121,7 +153,8 @@ def log_likelihood(model: AbstractBRDF, data: Data, s: Scalar) -> Scalar:
     """Log density of the measured values (in sr⁻¹), noise and discrepancy included."""
     r = residuals(model, data, s)
     logs = jnp.log(spread(data.x, data.noise, s)) - jnp.log(data.kappa) + 0.5 * np.log(2.0 * np.pi)
-    return -jnp.sum(0.5 * r**2 + data.weight * logs)
+    # Dot products, not sums: XLA fuses a sum with what it adds up into a scalar loop, five times slower on a CPU.
+    return -0.5 * jnp.vdot(r, r) - jnp.vdot(data.weight, logs)
 
 
 def best_discrepancy(predicted: Samples, data: Data, start: Scalar) -> Scalar:
@@ -138,7 +171,7 @@ def best_discrepancy(predicted: Samples, data: Data, start: Scalar) -> Scalar:
     def cost(t: Scalar) -> Scalar:
         s = jnp.exp(t)
         r = stabilised(data.x, data.noise, s) - stabilised(predicted, data.noise, s)
-        return jnp.sum(data.weight * (0.5 * r**2 + jnp.log(spread(data.x, data.noise, s))))
+        return jnp.vdot(data.weight, 0.5 * r**2 + jnp.log(spread(data.x, data.noise, s)))
 
     slope = jax.grad(cost)
     floor = jnp.log(NEGLIGIBLE * noise_scale(data))

@@ -90,7 +90,9 @@ def sample(
     walkers = walkers or max(32, 4 * dimensions)
     independent = emcee.moves.MHMove(_independent_proposal(fit))
     moves = [(independent, 0.6), (emcee.moves.DEMove(), 0.3), (emcee.moves.DESnookerMove(), 0.1)]
-    sampler = emcee.EnsembleSampler(walkers, dimensions, log_posterior(fit), moves=moves, vectorize=True)
+    density = log_posterior(fit)
+    sampler: Any = emcee.EnsembleSampler(walkers, dimensions, density, moves=moves, vectorize=True)
+    sampler.log_prob_fn = density  # emcee's wrapper prints a traceback to stdout on Ctrl-C
     random_state = np.random.RandomState(rng.integers(2**32)).get_state()
     state = emcee.State(_laplace_draws(fit, walkers, rng), random_state=random_state)
     goal, interrupted = SHORTEST, False
@@ -206,18 +208,21 @@ def _independent_proposal(fit: Fit) -> Callable[[np.ndarray, Any], tuple[np.ndar
 
 
 def _discrepancy_sd(fit: Fit) -> float:
-    """How far s must move from its best value for the log-likelihood to fall by ½."""
+    """Half of how far s must move from its best value for the log-likelihood to fall by 2.
+
+    That is σ of a Gaussian, and also the mean of the exponential that s follows where its best value is 0.
+    """
     unit = max(float(noise_scale(fit.data)), 1e-12)
     moves = unit * 2.0 ** np.arange(-12, 12)
     if fit.discrepancy > 0:
         moves = np.concatenate([moves, fit.discrepancy * 2.0 ** np.arange(-8, 3)])
     moves.sort()
     drop = fit.log_likelihood - np.asarray(_over_discrepancy(fit.model, fit.data, jnp.asarray(fit.discrepancy + moves)))
-    crossing = np.flatnonzero(drop > 0.5)
+    crossing = np.flatnonzero(drop > 2.0)
     if len(crossing) == 0:
         return float(moves[-1])
     first = crossing[0]
-    return float(moves[first] / np.sqrt(max(drop[first] / 0.5, 1.0)))
+    return float(moves[first] / np.sqrt(2.0 * drop[first]))
 
 
 @eqx.filter_jit
