@@ -1,14 +1,22 @@
 """The command line: parse, one library call, print. The only room that speaks."""
 
+import _thread
+import io
+import logging
+import os
+import signal
 import sys
+import warnings
 from pathlib import Path
-from typing import Annotated, Any
+from types import FrameType
+from typing import Annotated, Any, NoReturn
 
 import typer
 
 from fitmat.errors import FitmatError
 
 DEFAULT_MODELS = "lambert+blinn-phong,lambert+ggx"
+WRONG_INPUT = 1
 NOT_CONVERGED = 3
 INTERRUPTED = 130
 
@@ -17,10 +25,13 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
+    epilog="Examples: [bold]fitmat fit measurements.csv[/bold] writes measurements-fitmat/report.html; "
+    "[bold]fitmat models ggx[/bold] explains a model; "
+    "[bold]fitmat simulate lambert+ggx --set alpha=0.2[/bold] makes data to try it on.",
     help="Turn measured reflectance into a material you can trust: fitted BRDF models, honest uncertainties, and how "
     "closely the empirical Phong model matches the microfacet model.\n\n"
-    "Start with [bold]fitmat fit measurements.csv[/bold].\n\n"
-    "Exit codes: 0 all fits converged; 1 wrong input; 2 wrong usage; 3 a fit ended otherwise (the report is written).",
+    "Exit codes: 0 all fits converged; 1 wrong input; 2 wrong usage; 3 a fit ended otherwise (the report is written); "
+    "130 stopped with Ctrl-C before there was anything to report.",
 )
 
 
@@ -35,74 +46,102 @@ def _setup() -> None:
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
 
 
-@app.command()
+@app.command(
+    epilog="Columns, by name: theta_i, theta_o and phi (or phi_i and phi_o, or a signed theta_o alone) in degrees; "
+    "brdf, brdf_cos or reflectance_factor; brdf_r, brdf_g, brdf_b or brdf_550 for channels; sigma where the noise is "
+    "known.\n\n"
+    "Written to --out: report.html (tables and pictures), fit.json (the same numbers), posterior-MODEL.nc (draws of "
+    "the parameters, for ArviZ). Ctrl-C during sampling keeps what is done and still writes them.\n\n"
+    "Examples:\n\n"
+    "  fitmat fit measurements.csv\n\n"
+    "  fitmat fit measurements.csv --models lambert+ggx --fix ks=1 --out run1\n\n"
+    "  fitmat fit scan.txt --columns theta_i=AOI,brdf=4 --no-mcmc"
+)
 def fit(
     file: Annotated[Path, typer.Argument(help="Measurements: CSV or any text table, one row per pair of directions.")],
     models: Annotated[
-        str, typer.Option(help="Models to fit, separated by commas; see [bold]fitmat models[/bold].")
+        str,
+        typer.Option(
+            help="Models to fit, separated by commas; see [bold]fitmat models[/bold]. An empirical and a microfacet "
+            "model are compared. Default: lambert+blinn-phong and lambert+ggx.",
+            metavar="NAMES",
+            show_default=False,
+        ),
     ] = DEFAULT_MODELS,
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder for the report; default NAME-fitmat beside the input.", show_default=False),
+        typer.Option(
+            help="Folder for the report; default NAME-fitmat (then -2, -3, …) beside the input.",
+            metavar="DIR",
+            show_default=False,
+        ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the files of an earlier run in --out.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace the report of an earlier run in --out.")] = False,
     json_: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")] = False,
     no_mcmc: Annotated[
-        bool, typer.Option("--no-mcmc", help="Skip sampling; intervals from Laplace's approximation, in seconds.")
+        bool, typer.Option("--no-mcmc", help="Skip sampling: faster, intervals from Laplace's approximation.")
     ] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the sampling; the same seed gives the same report.")] = 0,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Seed of the sampling; the same seed, the same report.", metavar="N")
+    ] = 0,
     fix: Annotated[
-        list[str] | None, typer.Option(help="Hold a parameter, e.g. ks=1; repeat for more.", show_default=False)
+        list[str] | None,
+        typer.Option(help="Hold a parameter, e.g. ks=1; repeat for more.", metavar="NAME=VALUE", show_default=False),
     ] = None,
     masking: Annotated[
         str | None,
-        typer.Option(help="Masking of microfacet lobes: correlated, separable, v-cavity.", show_default=False),
+        typer.Option(
+            help="Shadowing of microfacet lobes: correlated (default), separable or v-cavity.",
+            metavar="KIND",
+            show_default=False,
+        ),
     ] = None,
     columns: Annotated[
         str | None,
         typer.Option(
-            help="Foreign headers: theta_i=Zenith,theta_o=3,brdf=BSDF (a header name, or a 1-based column number).",
+            help="Which column is what, where the header has other names: theta_i=Zenith,brdf=3 (a name in the "
+            "header, or a column number from 1).",
+            metavar="OURS=THEIRS",
             show_default=False,
         ),
     ] = None,
     quantity: Annotated[
         str | None,
         typer.Option(
-            help="What a column called 'value' holds: brdf (sr⁻¹), brdf_cos, reflectance_factor.", show_default=False
+            help="What a column called 'value' holds: brdf (sr⁻¹), brdf_cos or reflectance_factor.",
+            metavar="KIND",
+            show_default=False,
         ),
     ] = None,
     angle_unit: Annotated[
-        str | None, typer.Option(help="degrees or radians; default degrees.", show_default=False)
+        str | None,
+        typer.Option(help="Unit of the angles: degrees (default) or radians.", metavar="UNIT", show_default=False),
     ] = None,
     forward: Annotated[
         str,
-        typer.Option(help="Which sign of theta_o is the mirror side in files without azimuth: positive or negative."),
+        typer.Option(
+            help="Sign of theta_o on the mirror side, in files without azimuth: positive or negative.", metavar="SIGN"
+        ),
     ] = "positive",
     specular_azimuth: Annotated[
-        int, typer.Option(help="Relative azimuth phi of the mirror direction in the file: 180 or 0.")
+        int, typer.Option(help="Relative azimuth phi of the mirror side in the file: 180 or 0.", metavar="PHI")
     ] = 180,
 ) -> None:
-    """Fit models to a file of measurements and write a report with the Phong–microfacet match.
-
-    Columns, by name: theta_i, theta_o and phi (or phi_i, phi_o; or a signed theta_o alone) in degrees; brdf,
-    brdf_cos or reflectance_factor; brdf_r, brdf_g, brdf_b or brdf_550 for channels; sigma where the noise is known.
-
-    Example: fitmat fit measurements.csv --models lambert+ggx --fix ks=1 --seed 1
-    """
+    """Fit models to a file of measurements and write a report with the Phong–microfacet match."""
     _setup()
-    from fitmat import console, report
+    from fitmat import console, folder, report
     from fitmat.formats import read
     from fitmat.params import assignments
 
     reading: dict[str, Any] = {"columns": columns, "quantity": quantity, "angle_unit": angle_unit}
     names, fixed = console.model_names(models), assignments(fix or [], "--fix")
     measurements = read(file, **reading, forward=forward, specular_azimuth=specular_azimuth)
-    target = out or report.default_folder(file)
-    with report.new_folder(target, force=force) as folder:
+    target = out or folder.default(file)
+    with folder.new(target, force=force, stale=report.POSTERIOR.format("*")) as draft:
         posteriors, match = console.study(
             measurements, names, fixed=fixed, masking=masking, sampling=not no_mcmc, seed=seed
         )
-        report.write(folder, posteriors, match)
+        report.write(draft, posteriors, match)
     if json_:
         sys.stdout.write((target / "fit.json").read_text(encoding="utf-8"))
     else:
@@ -111,23 +150,45 @@ def fit(
         raise typer.Exit(NOT_CONVERGED)
 
 
-@app.command()
+@app.command(
+    epilog="Parameters that are not set keep the model's defaults, see fitmat models.\n\n"
+    "Example:\n\n"
+    "  fitmat simulate lambert+ggx --set kd=0.3 --set alpha=0.2 --out plastic.csv"
+)
 def simulate(
     model: Annotated[str | None, typer.Argument(help="True model, e.g. lambert+ggx.", show_default=False)] = None,
     out: Annotated[Path, typer.Option(help="CSV file to write.")] = Path("simulated.csv"),
     set_: Annotated[
         list[str] | None,
-        typer.Option("--set", help="A true parameter, e.g. alpha=0.2 or kd=0.4,0.1,0.1; repeat.", show_default=False),
+        typer.Option(
+            "--set",
+            help="A true parameter, e.g. alpha=0.2, or kd=0.4,0.1,0.1 for three channels; repeat for more.",
+            metavar="NAME=VALUE",
+            show_default=False,
+        ),
     ] = None,
-    theta_i: Annotated[str, typer.Option(help="Incidence angles in degrees.")] = "10,30,45,60,75",
+    theta_i: Annotated[
+        str, typer.Option(help="Incidence angles in degrees, as --theta-o.", metavar="ANGLES")
+    ] = "10,30,45,60,75",
     theta_o: Annotated[
-        str, typer.Option(help="Outgoing angles in degrees, FIRST:LAST:STEP or a list; positive = mirror side.")
+        str,
+        typer.Option(
+            help="Outgoing angles in degrees, FIRST:LAST:STEP or a list A,B,C; positive = mirror side.",
+            metavar="ANGLES",
+        ),
     ] = "-80:80:2",
-    noise: Annotated[float, typer.Option(min=0, help="Relative noise, as a fraction of the true value.")] = 0.02,
-    floor: Annotated[float, typer.Option(min=0, help="Absolute noise in sr⁻¹.")] = 1e-3,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
+    noise: Annotated[
+        float, typer.Option(min=0, help="Relative noise, as a fraction of the true value.", metavar="X")
+    ] = 0.02,
+    floor: Annotated[float, typer.Option(min=0, help="Absolute noise in sr⁻¹.", metavar="X")] = 1e-3,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.", metavar="N")] = 0,
     masking: Annotated[
-        str | None, typer.Option(help="Masking: correlated, separable, v-cavity.", show_default=False)
+        str | None,
+        typer.Option(
+            help="Shadowing of microfacet lobes: correlated (default), separable or v-cavity.",
+            metavar="KIND",
+            show_default=False,
+        ),
     ] = None,
     catalogue: Annotated[
         Path | None,
@@ -135,17 +196,14 @@ def simulate(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
 ) -> None:
-    """Simulate measurements of a known material, to test an instrument's plan or fitmat itself.
-
-    Example: fitmat simulate lambert+ggx --set kd=0.3 --set alpha=0.2 --noise 0.03 --out plastic.csv
-    """
+    """Simulate measurements of a known material, to test an instrument's plan or fitmat itself."""
     _setup()
     from fitmat import simulation
 
     if catalogue is not None:
         written = simulation.write_catalogue(catalogue, force=force)
     else:
-        angles = simulation.angles(theta_i, "--theta-i"), simulation.angles(theta_o, "--theta-o")
+        angles = simulation.angles(theta_i, "--theta-i", lowest=0.0), simulation.angles(theta_o, "--theta-o")
         truth = simulation.truth(model, set_ or [], masking)
         written = simulation.write_simulation(out, truth, angles, noise=(noise, floor, seed), force=force)
     typer.echo("\n".join(str(path) for path in written))
@@ -165,9 +223,63 @@ def models(
 
 
 def main() -> None:
-    """Run the command line; wrong input becomes one line on stderr and exit code 1."""
+    """Run the command line; wrong input, a full disk and Ctrl-C become one line on stderr and an exit code."""
+    _prepare()
+    asked: list[int] = []
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        asked.append(number)
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, interrupt)
     try:
-        app()
+        try:
+            app()
+        finally:
+            sys.stdout.flush()
     except FitmatError as error:
-        sys.stderr.write(f"fitmat: {error}\n")
-        sys.exit(1)
+        _end(str(error))
+    except OSError as error:
+        # What could not be written must not be tried again when Python closes stdout.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        _end(f"cannot write the output: {error.strerror or error}.")
+    except ImportError:
+        # An extension module that Ctrl-C met while it was loading says no more than that it could not load.
+        if not asked:
+            raise
+        _interrupted()
+    except SystemExit as end:
+        if end.code != INTERRUPTED:
+            raise
+        _interrupted()
+
+
+def _prepare() -> None:
+    """Keep stderr for what the user must act on, and never fail on a character that the terminal lacks."""
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")
+    logging.disable(logging.WARNING)
+    sys.unraisablehook = _raise_again
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+def _raise_again(lost: "sys.UnraisableHookArgs") -> None:
+    """A Ctrl-C that arrived in a callback of JAX would be lost with a traceback; it is sent once more."""
+    if issubclass(lost.exc_type, KeyboardInterrupt):
+        _thread.interrupt_main()
+    else:
+        sys.__unraisablehook__(lost)
+
+
+def _end(message: str) -> NoReturn:
+    sys.stderr.write(f"fitmat: {message}\n")
+    sys.exit(WRONG_INPUT)
+
+
+def _interrupted() -> None:
+    """End at once: Python's own way out may crash while compiled code is still running."""
+    sys.stderr.write("fitmat: interrupted before the end; no report was written.\n")
+    sys.stderr.flush()
+    os._exit(INTERRUPTED)

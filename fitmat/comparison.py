@@ -114,7 +114,9 @@ class Comparison:
         for name, albedo in zip(names, (self.albedo_empirical[1], self.albedo_microfacet[1]), strict=True):
             if albedo.max() > 1.0 + ALBEDO_ERROR:
                 at = np.rad2deg(self.albedo_theta_i[np.argmax(albedo)])
-                sentences.append(f"{name} reflects more light than it receives (albedo {albedo.max():.2f} at {at:.0f}°).")
+                sentences.append(
+                    f"{name} reflects more light than it receives (albedo {albedo.max():.2f} at {at:.0f}°)."
+                )
         unsure = [p.fit for p in (self.empirical, self.microfacet) if p.fit.result in ("max_steps", "nonfinite")]
         sentences += [f"Do not rely on this match: the fit of {f.name} ended {f.result}." for f in unsure]
         return " ".join(sentences)

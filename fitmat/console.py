@@ -3,15 +3,19 @@
 Progress goes to stderr, results to stdout; nothing is computed here.
 """
 
+import contextlib
 import inspect
-from collections.abc import Mapping, Sequence
+import signal
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from rich.text import Text
 
 from fitmat.brdf import LOBES, lobe_names, model
 from fitmat.comparison import Comparison, compare, is_empirical, is_microfacet
@@ -58,12 +62,34 @@ def study(
                 posteriors.append(laplace(found, seed=seed))
                 continue
             bar.update(task, description=f"sampling {name}")
-            posterior = sample(found, seed=seed, progress=lambda done, total, task=task: bar.update(
-                task, completed=done, total=total))  # fmt: skip
+            with _interrupt_later() as asked:
+
+                def progress(done: int, total: int, task: TaskID = task, asked: list[int] = asked) -> None:
+                    bar.update(task, completed=done, total=total)
+                    if asked:
+                        raise KeyboardInterrupt
+
+                posterior = sample(found, seed=seed, progress=progress)
             posteriors.append(posterior)
             sampling = not posterior.interrupted
         bar.add_task("comparing", total=None)
         return posteriors, _match(posteriors)
+
+
+@contextlib.contextmanager
+def _interrupt_later() -> Iterator[list[int]]:
+    """Ctrl-C is noted in the list, not raised in the middle of compiled code; a second one raises."""
+    asked: list[int] = []
+
+    def note(number: int, frame: FrameType | None) -> None:
+        asked.append(number)
+        signal.signal(signal.SIGINT, before)
+
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield asked
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _options(name: str, names: Sequence[str], fixed: Mapping[str, np.ndarray], masking: str | None) -> dict[str, Any]:
@@ -82,10 +108,13 @@ def _options(name: str, names: Sequence[str], fixed: Mapping[str, np.ndarray], m
 
 
 def _match(posteriors: Sequence[Posterior]) -> Comparison | None:
-    """The match of the first empirical and the first microfacet model, if there are both."""
+    """The match of the first empirical and the first microfacet model, if there are both and both are finite."""
     empirical = next((p for p in posteriors if is_empirical(p.fit.name)), None)
     microfacet = next((p for p in posteriors if is_microfacet(p.fit.name) and not is_empirical(p.fit.name)), None)
-    return compare(empirical, microfacet) if empirical and microfacet else None
+    if empirical is None or microfacet is None or not (empirical.fit.finite and microfacet.fit.finite):
+        return None
+    found = compare(empirical, microfacet)
+    return found if np.isfinite(found.hemisphere_distance.value) else None
 
 
 def show(posteriors: Sequence[Posterior], match: Comparison | None, folder: Path) -> None:
@@ -95,48 +124,55 @@ def show(posteriors: Sequence[Posterior], match: Comparison | None, folder: Path
     out.print(str(m), markup=False, highlight=False)
     out.print(posteriors[0].fit.noise.words, markup=False, highlight=False)
     for posterior in posteriors:
+        out.print(f"\n[bold]{_title(posterior)}[/bold]", highlight=False)
         out.print(_table(posterior))
         if posterior.fit.result != "converged":
             out.print(f"[yellow]{posterior.fit.result}[/yellow]: {RESULTS[posterior.fit.result]}", highlight=False)
         if posterior.interrupted:
             out.print("[yellow]interrupted[/yellow]: sampling was stopped; what was done is kept.", highlight=False)
+    out.print("\n→ follows from the parameters above it", highlight=False, style="dim")
     words = match.verdict if match else " ".join(f"{p.fit.name} {p.fit.adequacy}." for p in posteriors)
     out.print(f"\n[bold]{words}[/bold]\n", highlight=False)
     out.print(f"Report: {folder / 'report.html'}", markup=False, highlight=False, soft_wrap=True)
 
 
-def _table(posterior: Posterior) -> Table:
+def _title(posterior: Posterior) -> str:
     fit = posterior.fit
     agreeing = f"{fit.n_starts_agreeing} of {fit.n_starts} starts agree"
-    table = Table(
-        title=f"{fit.name}: {fit.result}, {agreeing}, posterior {posterior.verdict}",
-        title_justify="left",
-        title_style="bold",
-        box=None,
-        pad_edge=False,
-    )
-    for heading in ("parameter", "", "value ± sd", "95 % interval", "unit", ""):
-        table.add_column(heading, no_wrap=heading != "")
+    return f"{fit.name}: {fit.result}, {agreeing}, posterior {posterior.verdict}"
+
+
+def _table(posterior: Posterior) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for heading in ("parameter", "", "value ± sd", "95 % interval", ""):
+        table.add_column(heading, no_wrap=True)
     for row in rows(posterior):
         name = f"→ {row['name']}" if row["kind"] == "follows" else row["name"]
-        table.add_row(name, row["symbol"], row["value"], row["interval"], row["unit"], row["remark"])
+        remark = " ".join(part for part in (row["unit"], row["remark"].removesuffix(" by these angles")) if part)
+        table.add_row(*(Text(cell) for cell in (name, row["symbol"], row["value"], row["interval"], remark)))
     return table
 
 
 def list_models() -> None:
-    """Print every lobe with its parameters and the first line of its manual page."""
+    """Print every lobe with its parameters and the first line of its manual page, or what sets a variant apart."""
     table = Table(box=None, pad_edge=False)
     for heading in ("lobe", "parameters", "what it is"):
         table.add_column(heading, no_wrap=heading == "lobe")
     for name, lobe in LOBES.items():
-        first = (lobe.shape.__doc__ or "").splitlines()[0]
-        table.add_row(name, ", ".join(lobe.defaults()), first)
+        words = _first_line(lobe.shape)
+        if lobe.fresnel is not None and lobe.fresnel.suffix:
+            words = f"{name.removesuffix(lobe.fresnel.suffix)} with another Fresnel term. {_first_line(lobe.fresnel)}"
+        table.add_row(name, ", ".join(lobe.defaults()), Text(words))
     out = Console()
     out.print(table)
     out.print(
         "\nA model is a sum of lobes: lambert+ggx. 'fitmat models ggx' prints the manual page of a lobe.",
         highlight=False,
     )
+
+
+def _first_line(documented: object) -> str:
+    return (inspect.getdoc(documented) or "").split("\n", 1)[0]
 
 
 def manual(name: str) -> None:

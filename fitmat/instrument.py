@@ -17,6 +17,9 @@ MIN_RESIDUALS = 12
 UNKNOWN_RELATIVE = 1e-3
 """Placeholder noise where none can be estimated: small, so that the inferred discrepancy takes its place."""
 
+COPIED = 1e-12
+"""A scatter below this fraction of the maximum is that of copied rows, not of repeated measurements."""
+
 _T_DOF = 4.0
 # Scale of a t distribution with 4 degrees of freedom that fits Gaussian data best: the root s of
 # E[5 x²/(4 s² + x²)] = 1 for x ~ N(0, 1).
@@ -54,8 +57,8 @@ def noise(m: Measurements) -> Noise:
         level, error, factor = _leave_one_out(m, k)
         used = np.isfinite(error)
         smooth = np.where(np.isfinite(level), np.abs(level), np.abs(m.value[:, k]))
-        if used.sum() < MIN_RESIDUALS:
-            top = float(np.max(np.abs(m.value[m.valid[:, k], k]), initial=0.0))
+        top = float(np.max(np.abs(m.value[m.valid[:, k], k]), initial=0.0))
+        if used.sum() < MIN_RESIDUALS or np.median(np.abs(error[used])) <= COPIED * top:
             sigma[:, k] = UNKNOWN_RELATIVE * np.maximum(smooth, UNKNOWN_RELATIVE * max(top, 1e-12))
             words.append("")
             continue
@@ -67,7 +70,8 @@ def noise(m: Measurements) -> Noise:
         return Noise(
             sigma,
             False,
-            "Noise unknown: too few repeats or neighbouring angles; all scatter is counted as model misfit.",
+            "Noise unknown: too few repeats or neighbouring angles, or exact copies; "
+            "all scatter is counted as model misfit.",
         )
     return Noise(sigma, True, f"Noise estimated from neighbouring angles: {'; '.join(words)}.")
 
@@ -131,7 +135,7 @@ def _components(error: np.ndarray, level: np.ndarray, factor: np.ndarray) -> tup
 
     def cost(logs: np.ndarray) -> float:
         a, b = np.exp(logs)
-        scale = _T_SCALE * np.sqrt(factor * (a**2 + (b * level) ** 2))
+        scale = _T_SCALE * np.sqrt(factor) * np.hypot(a, b * level)
         t = (_T_DOF + 1.0) / 2.0 * np.log1p((error / scale) ** 2 / _T_DOF)
         return float(np.sum(t + np.log(scale)))
 

@@ -84,6 +84,7 @@ def _padded(part: np.ndarray, extra: int, fill: float | tuple[float, ...]) -> np
     return np.concatenate([part, np.broadcast_to(np.asarray(fill), (extra, part.shape[1]))])
 
 
+@jax.custom_jvp
 def _shape(q2: Array) -> Array:
     """3(q − atan q)/q³ as a function of q²; for q > 1 by atan q = π/2 − atan(1/q), with the same polynomial."""
     near = q2 <= 1.0
@@ -92,6 +93,17 @@ def _shape(q2: Array) -> Array:
     polynomial = jnp.polyval(jnp.asarray(_NEAR), 2.0 * jnp.where(near, q2, v2) - 1.0)
     far = 3.0 * v**3 * (1.0 / v - jnp.pi / 2.0 + v * (1.0 - v2 * polynomial / 3.0))
     return jnp.where(near, polynomial, far)
+
+
+@_shape.defjvp
+def _shape_jvp(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
+    """g′(w) = 3(1/(1 + w) − g)/(2w), which follows from z′(x) = 1/(a + d); by its power series where that cancels."""
+    (w,), (w_dot,) = primals, tangents
+    g = _shape(w)
+    small = w < 1e-3
+    series = -3.0 / 5.0 + w * (6.0 / 7.0 - w * (1.0 - w * 12.0 / 11.0))
+    safe = jnp.where(small, 1.0, w)
+    return g, jnp.where(small, series, 1.5 / safe * (1.0 / (1.0 + safe) - g)) * w_dot
 
 
 def _two_thirds(x: Array) -> Array:
@@ -189,12 +201,14 @@ NEGLIGIBLE = 1e-3
 """A discrepancy below this fraction of the noise is reported as none."""
 
 
+@jax.jit
 def noise_scale(data: Data) -> Scalar:
     """The s whose discrepancy equals the noise for the typical sample, in sr^(−1/3)."""
     ratio = data.noise / (3.0 * jnp.cbrt(jnp.abs(data.x) + data.noise) ** 2)
     return jnp.nanmedian(jnp.where(data.weight > 0, ratio, jnp.nan))
 
 
+@jax.jit
 def first_discrepancy(data: Data) -> Scalar:
     """A first s before anything is fitted: a tenth of the typical ∛x."""
     return 0.1 * jnp.nanmedian(jnp.where(data.weight > 0, jnp.cbrt(jnp.abs(data.x)), jnp.nan))

@@ -152,15 +152,19 @@ class Space:
         """Natural → physical."""
         return jnp.where(self.log, jnp.exp(jnp.where(self.log, natural, 0.0)), natural)
 
+    def natural_array(self, values: np.ndarray) -> np.ndarray:
+        """`natural` for NumPy arrays, which need no compiled program."""
+        return np.where(self.log, np.log(np.where(self.log, values, 1.0)), values)
+
     @property
     def natural_lower(self) -> np.ndarray:
         """Lower bounds, natural."""
-        return np.where(self.log, np.log(np.where(self.log, self.lower, 1.0)), self.lower)
+        return self.natural_array(self.lower)
 
     @property
     def natural_upper(self) -> np.ndarray:
         """Upper bounds, natural."""
-        return np.where(self.log, np.log(np.where(self.log, self.upper, 1.0)), self.upper)
+        return self.natural_array(self.upper)
 
     def to_free(self, values: Array) -> Array:
         """Physical → free; values on or outside a bound are nudged inside."""
@@ -176,7 +180,7 @@ class Space:
     def at_bound(self, values: np.ndarray) -> np.ndarray:
         """Which physical values sit on a bound: −1 lower, +1 upper, 0 inside."""
         span = self.natural_upper - self.natural_lower
-        t = (np.asarray(self.natural(jnp.asarray(values))) - self.natural_lower) / span
+        t = (self.natural_array(values) - self.natural_lower) / span
         return np.where(t < AT_BOUND, -1, np.where(t > 1.0 - AT_BOUND, 1, 0))
 
 

@@ -90,7 +90,8 @@ def plot_residuals(fit: Fit, *, channel: int = 0, ax: Axes | None = None) -> Axe
     )
     ax.axhspan(-2, 2, color="0.9", zorder=0)
     ax.set(xlim=(-90, 90), xticks=[-60, -30, 0, 30, 60])
-    ax.set_title(fit.name, fontsize=9)
+    names = fit.measurements.channels
+    ax.set_title(fit.name + (f", channel {names[channel]}" if len(names) > 1 else ""), fontsize=9)
     ax.set_xlabel("θₒ / °  (positive = mirror side)", fontsize=8)
     ax.set_ylabel("residual / standard deviations", fontsize=8)
     ax.tick_params(labelsize=7)
@@ -108,7 +109,8 @@ def plot_albedo(match: Comparison, ax: Axes | None = None) -> Axes:
         ax.plot(angle, band[1], color=colour, label=posterior.fit.name)
     ax.axvline(match.albedo_gap_theta_i_deg, color="0.75", lw=0.8, ls=":", zorder=0)
     ax.axhline(1.0, color="0.5", lw=0.8, ls="--")
-    ax.set(xlim=(0, 90), ylim=(0, max(1.05, float(match.albedo_empirical.max()) * 1.05)))
+    highest = max(float(band[1].max()) for _, band in pairs)
+    ax.set(xlim=(0, 90), ylim=(0, max(1.05, 1.1 * highest)))
     ax.set_xlabel("incidence θᵢ / °")
     ax.set_ylabel("directional albedo ρ(θᵢ)")
     ax.legend(fontsize=8)
@@ -133,8 +135,12 @@ def plot_corner(posterior: Posterior) -> Figure:
         for low, high, s, c in zip(*np.quantile(draws, [0.001, 0.999], axis=0), spread, centre, strict=True)
     ]
     side = 1.4 * len(columns) + 0.8
-    return corner.corner(
-        draws, labels=labels, range=ranges, truths=fit.values[columns], truth_color=ORANGE, color=BLUE, bins=24,
-        quantiles=[0.025, 0.975], plot_datapoints=False, fig=Figure(figsize=(side, side)), label_kwargs={"fontsize": 9},
-        labelpad=0.1, max_n_ticks=3,
+    several = len(columns) > 1
+    figure = corner.corner(
+        draws, labels=labels, range=ranges, truths=fit.values[columns] if several else None, truth_color=ORANGE,
+        color=BLUE, bins=24, quantiles=[0.025, 0.975], plot_datapoints=False, fig=Figure(figsize=(side, side)),
+        label_kwargs={"fontsize": 9}, labelpad=0.2, max_n_ticks=3, smooth=0.8,
     )  # fmt: skip
+    if not several:  # corner cannot mark the best fit of a single parameter
+        figure.axes[0].axvline(fit.values[columns[0]], color=ORANGE)
+    return figure

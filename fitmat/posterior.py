@@ -4,6 +4,7 @@ Draws nothing itself; `uncertainty` does.
 """
 
 import dataclasses
+import io
 from pathlib import Path
 from typing import Any
 
@@ -138,9 +139,12 @@ class Posterior:
         variables["discrepancy"] = self.discrepancy[None] if self.chain is None else chain[..., -1]
         attributes: dict[str, Any] = {"model": self.fit.name, "method": self.method, "verdict": self.verdict}
         if self.diagnostics is not None:
-            attributes |= {"seed": self.diagnostics.seed, "burn_in": self.diagnostics.burn_in}
+            attributes |= {"seed": str(self.diagnostics.seed), "burn_in": self.diagnostics.burn_in}
         tree = from_dict({"posterior": variables}, attrs={"posterior": attributes})
-        tree.to_netcdf(str(path), engine="h5netcdf")
+        # HDF5 crashes the process where the disk is full, so that Python writes the file.
+        memory = io.BytesIO()
+        tree.to_netcdf(memory, engine="h5netcdf")
+        Path(path).write_bytes(memory.getvalue())
 
 
 def split_rhat(chain: Float[np.ndarray, "steps walkers d"]) -> Float[np.ndarray, " d"]:

@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from scipy.special import ndtri
 
 from fitmat.brdf import AbstractBRDF, evaluate, evaluate_pairs
 from fitmat.geometry import from_angles
@@ -77,7 +78,7 @@ def predictive_band(posterior: Posterior, rows: np.ndarray) -> Float[np.ndarray,
     data = prepare(fit.measurements.rows(rows), noise)
     values, s = posterior.thinned(BAND_DRAWS)
     levels = np.random.default_rng(0).permutation((np.arange(len(s)) + 0.5) / len(s))
-    parts = (jnp.asarray(values), jnp.asarray(s), jax.scipy.stats.norm.ppf(jnp.asarray(levels)))
+    parts = (jnp.asarray(values), jnp.asarray(s), jnp.asarray(ndtri(levels)))
     return np.asarray(_band(fit.model, data, *parts))[:, : len(rows)]
 
 
@@ -85,7 +86,7 @@ def predictive_band(posterior: Posterior, rows: np.ndarray) -> Float[np.ndarray,
 def _band(template: AbstractBRDF, data: Data, values: Array, discrepancy: Array, normal: Array) -> Array:
     def draw(value: Array, s: Array, e: Array) -> Array:
         x = evaluate_pairs(with_vector(template, value), data.wi, data.wo) * data.kappa
-        return from_stabilised(stabilised(x, data.noise, s) + e, data.noise, s, x) / data.kappa
+        return from_stabilised(stabilised(x, data.noise, s) + e, data.noise, s) / data.kappa
 
     draws = jax.vmap(draw)(values, discrepancy, normal)
     return jnp.quantile(draws, jnp.array([0.025, 0.975]), axis=0)

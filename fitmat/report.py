@@ -4,72 +4,32 @@ Formats numbers that other rooms computed; computes none.
 """
 
 import base64
-import contextlib
 import io
+import itertools
 import json
 import math
-import os
-import shutil
-import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import jinja2
 import numpy as np
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from fitmat import plots
 from fitmat.comparison import CLOSE, SIMILAR, Comparison, Estimate, fit_metrics
-from fitmat.errors import OutputError
+from fitmat.display import interval, with_error
 from fitmat.measurement import Measurements
 from fitmat.outcome import RESULTS
-from fitmat.posterior import Posterior
+from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, Posterior
 from fitmat.prediction import sections
 from fitmat.summary import Quantity, derived, parameters
 
 DPI = 96
 CHANNELS_DRAWN = 3
-
-
-def default_folder(source: Path) -> Path:
-    """`NAME-fitmat` beside the input, or the first `NAME-fitmat-2`, `-3`, … that does not exist."""
-    first = source.parent / f"{source.stem}-fitmat"
-    if not first.exists():
-        return first
-    return next(p for k in range(2, 10_000) if not (p := first.with_name(f"{first.name}-{k}")).exists())
-
-
-@contextlib.contextmanager
-def new_folder(target: Path, *, force: bool = False) -> Iterator[Path]:
-    """A folder to write into that appears as `target`, complete, when the block ends well.
-
-    Args:
-        target: The folder to make.
-        force: Replace the files of an earlier run in `target`.
-
-    Raises:
-        OutputError: `target` holds something and `force` is off, or the disk refuses.
-    """
-    if target.exists() and (not target.is_dir() or any(target.iterdir())) and not force:
-        raise OutputError(f"{target} already exists; give another --out DIR, or --force to replace the run in it.")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        draft = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-    except OSError as error:
-        raise OutputError(
-            f"cannot write beside {target}: {error.strerror}; choose another place with --out."
-        ) from error
-    try:
-        yield draft
-        target.mkdir(exist_ok=True)
-        for item in sorted(draft.iterdir()):
-            os.replace(item, target / item.name)
-        target.chmod(0o755)
-    except OSError as error:
-        raise OutputError(f"cannot write {target}: {error.strerror}; nothing there was changed.") from error
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
+POSTERIOR = "posterior-{}.nc"
 
 
 def write(folder: Path, posteriors: Sequence[Posterior], match: Comparison | None) -> None:
@@ -77,7 +37,7 @@ def write(folder: Path, posteriors: Sequence[Posterior], match: Comparison | Non
     found = to_dict(posteriors, match)
     (folder / "fit.json").write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     for posterior in posteriors:
-        posterior.save(folder / f"posterior-{posterior.fit.name}.nc")
+        posterior.save(folder / POSTERIOR.format(posterior.fit.name))
     (folder / "report.html").write_text(to_html(posteriors, match), encoding="utf-8")
 
 
@@ -86,6 +46,7 @@ def to_dict(posteriors: Sequence[Posterior], match: Comparison | None) -> dict[s
     m = posteriors[0].fit.measurements
     return _plain(
         {
+            "fitmat": version("fitmat"),
             "file": m.source,
             "n_samples": m.n_samples,
             "n_masked": m.n_masked,
@@ -166,16 +127,11 @@ def _plain(thing: Any) -> Any:
     return None if isinstance(thing, float) and not math.isfinite(thing) else thing
 
 
-def with_error(value: float, sd: float) -> str:
-    """A value to the precision of its standard deviation: `0.1503 ± 0.0010`; four digits where there is none."""
-    if not math.isfinite(sd) or sd <= 0 or sd > 1e6 * abs(value):
-        return f"{value:.4g}"
-    digits = max(0, 1 - math.floor(math.log10(sd)))
-    return f"{value:.{digits}f} ± {sd:.{digits}f}"
-
-
 def rows(posterior: Posterior) -> list[dict[str, str]]:
-    """One line per reported number, as text: name, symbol, value, interval, remark, what it means."""
+    """One line per reported number, as text: name, symbol, value, interval, remark, what it means.
+
+    What the data do not determine has its interval, but no standard deviation: the draws fill the range allowed.
+    """
     channels = posterior.fit.measurements.channels
     result = []
     for kind, quantities in (("fitted", parameters(posterior)), ("follows", derived(posterior))):
@@ -184,13 +140,14 @@ def rows(posterior: Posterior) -> list[dict[str, str]]:
                 low, high = q.ci95[k]
                 channel = f" {channels[k]}" if q.per_channel and len(channels) > 1 else ""
                 free = q.remark != "fixed" and np.isfinite(low) and np.isfinite(high)
+                sd = math.nan if q.remark.startswith("not determined") else q.sd[k]
                 result.append(
                     {
                         "kind": kind,
                         "name": q.name + channel,
                         "symbol": q.symbol,
-                        "value": with_error(q.value[k], q.sd[k]),
-                        "interval": f"{low:.4g} – {high:.4g}" if free else "",
+                        "value": with_error(q.value[k], sd),
+                        "interval": interval(low, high, sd) if free else "",
                         "unit": "" if q.unit == "1" else q.unit,
                         "remark": q.remark,
                         "doc": q.doc,
@@ -204,8 +161,9 @@ def to_html(posteriors: Sequence[Posterior], match: Comparison | None) -> str:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("fitmat"), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters["png"] = _png
+    environment.filters |= {"png": _png, "subscripted": _subscripted}
     return environment.get_template("report.html").render(
+        version=version("fitmat"),
         posteriors=posteriors,
         measurements=posteriors[0].fit.measurements,
         match=match,
@@ -216,20 +174,20 @@ def to_html(posteriors: Sequence[Posterior], match: Comparison | None) -> str:
         metrics=fit_metrics,
         curves=_curves(posteriors),
         residuals=_residuals(posteriors),
+        enough={"tau": ENOUGH_TAU, "ess": ENOUGH_ESS, "rhat": GOOD_RHAT},
         albedo=None if match is None else plots.plot_albedo(match).figure,
-        corners=[(p.fit.name, plots.plot_corner(p)) for p in posteriors],
+        corners=[(p.fit.name, plots.plot_corner(p)) for p in posteriors if p.fit.finite and len(p.fit.free)],
     )
 
 
 def _curves(posteriors: Sequence[Posterior]) -> list[tuple[str, Figure]]:
     m: Measurements = posteriors[0].fit.measurements
     found = sections(m)
-    drawn = np.unique(np.linspace(0, len(m.channels) - 1, CHANNELS_DRAWN).astype(int)) if found else []
     pages = []
-    for channel in drawn:
-        columns = min(3, len(found))
+    for channel in _drawn(m) if found else []:
+        columns = 2 if len(found) in (2, 4) else min(3, len(found))
         lines = -(-len(found) // columns)
-        figure = Figure(figsize=(3.6 * columns, 2.7 * lines + 0.3), layout="constrained")
+        figure = Figure(figsize=(max(3.6 * columns, 5.0), 2.7 * lines + 0.3), layout="constrained")
         for k, section in enumerate(found):
             ax = figure.add_subplot(lines, columns, k + 1)
             plots.plot_section(posteriors, section, channel=int(channel), ax=ax)
@@ -239,14 +197,29 @@ def _curves(posteriors: Sequence[Posterior]) -> list[tuple[str, Figure]]:
     return pages
 
 
+def _drawn(m: Measurements) -> list[int]:
+    """The channels that are drawn: at most `CHANNELS_DRAWN`, evenly spread."""
+    return [int(k) for k in np.unique(np.linspace(0, len(m.channels) - 1, CHANNELS_DRAWN).astype(int))]
+
+
 def _residuals(posteriors: Sequence[Posterior]) -> Figure:
-    figure = Figure(figsize=(5.0 * len(posteriors), 3.0), layout="constrained")
-    for k, posterior in enumerate(posteriors):
-        plots.plot_residuals(posterior.fit, ax=figure.add_subplot(1, len(posteriors), k + 1))
+    """One row for each channel drawn, one column for each model."""
+    drawn, columns = _drawn(posteriors[0].fit.measurements), len(posteriors)
+    figure = Figure(figsize=(5.0 * columns, 3.0 * len(drawn)), layout="constrained")
+    places = itertools.product(drawn, posteriors)
+    for k, (channel, posterior) in enumerate(places):
+        ax = figure.add_subplot(len(drawn), columns, k + 1)
+        plots.plot_residuals(posterior.fit, channel=channel, ax=ax)
     return figure
+
+
+def _subscripted(symbol: str) -> Markup:
+    """`k_d` as people write it, k with a small d below."""
+    letter, _, below = symbol.partition("_")
+    return Markup("{}<sub>{}</sub>").format(letter, below) if below else Markup("{}").format(symbol)
 
 
 def _png(figure: Figure) -> str:
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=DPI)
+    figure.savefig(buffer, format="png", dpi=DPI, bbox_inches="tight")
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -13,23 +13,34 @@ from fitmat.brdf import AbstractBRDF, model
 from fitmat.errors import ModelError, OutputError
 from fitmat.params import assignments
 
+MOST_ANGLES = 10_000
+"""More angles than this on one axis are a slip of the keyboard."""
 
-def angles(text: str, option: str) -> np.ndarray:
+
+def angles(text: str, option: str, *, lowest: float = -90.0) -> np.ndarray:
     """`FIRST:LAST:STEP` or a comma-separated list, in degrees.
 
+    Args:
+        text: What the user gave.
+        option: Its name, for messages.
+        lowest: Smallest angle allowed, degrees.
+
     Raises:
-        ModelError: the text is neither, or an angle is outside −90 to 90.
+        ModelError: the text is neither, there are too many angles, or one is outside `lowest` to 90.
     """
     try:
         if ":" in text:
             first, last, step = (float(part) for part in text.split(":"))
-            found = np.arange(first, last + step / 2, step) if step > 0 else np.empty(0)
+            count = (last - first) / step + 1.5 if step > 0 else 0.0
+            found = first + step * np.arange(int(min(max(count, 0.0), MOST_ANGLES + 1)))
         else:
             found = np.array([float(part) for part in text.split(",")])
     except ValueError as error:
         raise ModelError(f"{option} {text!r}: expected a list 10,30,60 or FIRST:LAST:STEP in degrees.") from error
-    if found.size == 0 or not (np.abs(found) < 90).all():
-        raise ModelError(f"{option} {text!r}: expected angles between -90 and 90 degrees, in rising order.")
+    if found.size > MOST_ANGLES:
+        raise ModelError(f"{option} {text!r}: expected at most {MOST_ANGLES} angles; take a larger step.")
+    if found.size == 0 or not ((found >= lowest) & (found > -90) & (found < 90)).all():
+        raise ModelError(f"{option} {text!r}: expected angles from {lowest:g} to below 90 degrees, in rising order.")
     return found
 
 

@@ -61,14 +61,14 @@ def least_squares(
     def flat(x: Array) -> Array:
         return jnp.ravel(residual(x, args))
 
-    start = flat(x0)
+    start, linear = jax.linearize(flat, x0)
     norm = jnp.sqrt(start @ start)
     unit = jnp.where(norm > 0, norm, 1.0)
-    columns = jax.vmap(lambda e: jax.jvp(flat, (x0,), (e,))[1])(jnp.eye(len(x0)))
+    columns = jax.vmap(linear)(jnp.eye(len(x0)))
     lengths = jnp.sqrt(jnp.sum(columns**2, axis=1))
     scale = jnp.where(lengths > 0, unit / jnp.where(lengths > 0, lengths, 1.0), 1.0)
-    linear = lx.Normal(lx.Cholesky()) if start.size >= TALL else lx.QR()
-    solver = optx.LevenbergMarquardt(rtol=tolerance, atol=tolerance, linear_solver=linear)
+    factoring = lx.Normal(lx.Cholesky()) if start.size >= TALL else lx.QR()
+    solver = optx.LevenbergMarquardt(rtol=tolerance, atol=tolerance, linear_solver=factoring)
     solution = optx.least_squares(
         lambda u, _: flat(u * scale) / unit, solver, x0 / scale, max_steps=max_steps, throw=False
     )

@@ -24,7 +24,7 @@ SWEEPS = 300
 
 def starting_points(
     model: AbstractBRDF, data: Data, s: Array, held: dict[str, np.ndarray], count: int
-) -> Float[Array, "k p"]:
+) -> Float[np.ndarray, "k p"]:
     """The `count` best parameter vectors of the grid, best first.
 
     Args:
@@ -44,8 +44,8 @@ def starting_points(
     nodes = np.array(_nodes(model, [e for e in free if not e.param.weight], held), float)
     weights = np.concatenate([np.arange(e.place.start, e.place.stop) for e in free if e.param.weight] or [[]])
     ranked, cost = _solve_nodes(model, thinned, s, jnp.asarray(nodes), tuple(int(w) for w in weights))
-    order = jnp.argsort(jnp.where(jnp.isfinite(cost), cost, jnp.inf))
-    return ranked[order[:count]]
+    order = np.argsort(np.nan_to_num(np.asarray(cost), nan=np.inf))
+    return np.asarray(ranked)[order[:count]]
 
 
 def _nodes(model: AbstractBRDF, shapes: list[Entry], held: dict[str, np.ndarray]) -> list[np.ndarray]:

@@ -87,10 +87,10 @@ def sample(
         raise FitmatError(f"{fit.name}: the fit ended {fit.result}, there is nothing to sample; check the data.")
     rng = np.random.default_rng(seed)
     dimensions = len(fit.free) + 1
-    walkers = walkers or max(32, 4 * dimensions)
+    walkers = walkers or default_walkers(fit)
     independent = emcee.moves.MHMove(_independent_proposal(fit))
     moves = [(independent, 0.6), (emcee.moves.DEMove(), 0.3), (emcee.moves.DESnookerMove(), 0.1)]
-    density = log_posterior(fit)
+    density = log_posterior(fit, walkers)
     sampler: Any = emcee.EnsembleSampler(walkers, dimensions, density, moves=moves, vectorize=True)
     sampler.log_prob_fn = density  # emcee's wrapper prints a traceback to stdout on Ctrl-C
     random_state = np.random.RandomState(rng.integers(2**32)).get_state()
@@ -137,13 +137,24 @@ def _posterior(fit: Fit, sampler: Any, seed: int, interrupted: bool) -> Posterio
     return Posterior(fit, "emcee", values, discrepancy, physical.reshape(chain.shape), found, interrupted)
 
 
-def log_posterior(fit: Fit) -> Callable[[np.ndarray], np.ndarray]:
-    """The log posterior density over (w, free + 1) natural coordinates as one compiled call; −inf outside."""
+def default_walkers(fit: Fit) -> int:
+    """The larger of 32 and four per sampled dimension."""
+    return max(32, 4 * (len(fit.free) + 1))
+
+
+def log_posterior(fit: Fit, batch: int = 1) -> Callable[[np.ndarray], np.ndarray]:
+    """The log posterior density over (w, free + 1) natural coordinates as one compiled call; −inf outside.
+
+    Args:
+        fit: What is sampled.
+        batch: Smaller w are filled up to this many, so that one program serves whole and half ensembles.
+    """
     free = tuple(int(k) for k in fit.free)
     arrays, static = eqx.partition((fit.model, fit.data), eqx.is_array)
 
     def call(coordinates: np.ndarray) -> np.ndarray:
-        return np.asarray(_log_posterior(arrays, static, free, jnp.asarray(coordinates)))
+        filled = np.pad(coordinates, ((0, max(0, batch - len(coordinates))), (0, 0)), mode="edge")
+        return np.asarray(_log_posterior(arrays, static, free, jnp.asarray(filled)))[: len(coordinates)]
 
     return call
 
@@ -167,7 +178,7 @@ def _laplace_gaussian(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     """Mean and covariance of the free natural coordinates and s."""
     whole, free = space(fit.model), fit.free
     span = (whole.natural_upper - whole.natural_lower)[free]
-    centre = np.append(np.asarray(whole.natural(vector(fit.model)))[free], fit.discrepancy)
+    centre = np.append(whole.natural_array(fit.values)[free], fit.discrepancy)
     covariance = np.zeros((len(centre),) * 2)
     covariance[:-1, :-1] = inverse_information(fit.information[np.ix_(free, free)], span)
     covariance[-1, -1] = _discrepancy_sd(fit) ** 2
@@ -213,21 +224,16 @@ def _discrepancy_sd(fit: Fit) -> float:
     That is σ of a Gaussian, and also the mean of the exponential that s follows where its best value is 0.
     """
     unit = max(float(noise_scale(fit.data)), 1e-12)
-    moves = unit * 2.0 ** np.arange(-12, 12)
-    if fit.discrepancy > 0:
-        moves = np.concatenate([moves, fit.discrepancy * 2.0 ** np.arange(-8, 3)])
-    moves.sort()
-    drop = fit.log_likelihood - np.asarray(_over_discrepancy(fit.model, fit.data, jnp.asarray(fit.discrepancy + moves)))
+    moves = np.sort(np.concatenate([unit * 2.0 ** np.arange(-12, 12), fit.discrepancy * 2.0 ** np.arange(-6, 2)]))
+    moves = moves[moves > 0]
+    natural = space(fit.model).natural_array(fit.values)[fit.free]
+    along = np.column_stack([np.tile(natural, (len(moves), 1)), fit.discrepancy + moves])
+    drop = fit.log_likelihood - log_posterior(fit, default_walkers(fit))(along)
     crossing = np.flatnonzero(drop > 2.0)
     if len(crossing) == 0:
         return float(moves[-1])
     first = crossing[0]
     return float(moves[first] / np.sqrt(2.0 * drop[first]))
-
-
-@eqx.filter_jit
-def _over_discrepancy(model: AbstractBRDF, data: Data, s: Array) -> Array:
-    return jax.lax.map(lambda value: log_likelihood(model, data, value), s)
 
 
 def _physical(fit: Fit, natural: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

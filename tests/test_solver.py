@@ -38,7 +38,7 @@ class Score:
 
 
 @eqx.filter_jit
-def _solve(problem: Problem, x: Array, y: Array, x0: Array, max_steps: Array) -> tuple[Minimum, Array]:
+def _solve(problem: Problem, x: Array, y: Array, x0: Array, max_steps: int) -> tuple[Minimum, Array]:
     """The minimum and the standard deviations √diag(s²(JᵀJ)⁻¹)."""
 
     def residual(b: Array, _: None) -> Array:
@@ -50,7 +50,7 @@ def _solve(problem: Problem, x: Array, y: Array, x0: Array, max_steps: Array) ->
 
 
 def solved(problem: Problem, x0: np.ndarray, max_steps: int = 3000) -> tuple[Minimum, np.ndarray]:
-    end, sd = _solve(problem, jnp.asarray(problem.x), jnp.asarray(problem.y), jnp.asarray(x0), jnp.asarray(max_steps))
+    end, sd = _solve(problem, jnp.asarray(problem.x), jnp.asarray(problem.y), jnp.asarray(x0), max_steps)
     return end, np.asarray(sd)
 
 

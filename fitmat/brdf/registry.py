@@ -117,6 +117,8 @@ def _lobe(lobe: Lobe, masking: str | None, channels: int | None, values: dict[st
             if value.size not in (1, channels):
                 raise ModelError(f"parameter {key} has {value.size} values: expected 1 or {channels}, one a channel.")
             value = np.broadcast_to(np.ravel(value), (channels,))
+        elif channels is not None and value.size != 1:
+            raise ModelError(f"parameter {key} has {value.size} values: expected 1, it is shared by all channels.")
         numbers[key] = value
     if lobe.fresnel is None:
         return lobe.shape(**numbers)

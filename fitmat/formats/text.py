@@ -42,7 +42,7 @@ def load(path: str | os.PathLike[str]) -> Table:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise ReadError(f"{path}: cannot be opened ({reason}), expected a readable file. Check its rights.") from error
-    source = Path(path).name
+    source = Path(path).name.encode("utf-8", "replace").decode("utf-8")
     if not raw:
         raise ReadError(f"{source}: the file is empty (0 bytes), expected a table. Was its download cut off?")
     text, notes = _decode(raw, source)

@@ -1,0 +1,137 @@
+"""Shows how fast a fit is: one converged fit of Lambert + GGX beside scipy.optimize.least_squares(method="lm").
+
+Both minimise the same residuals of the same simulated data in the same unbounded coordinates from the same start and
+must end at the same parameters. Ours is compiled and warm; scipy's model is plain vectorised numpy (`peer.py`).
+The whole `fitmat.fit` (grid, 6 starts, discrepancy, covariance), warm, stands beside scipy's single start.
+
+Run: python benchmarks/fit.py [--rows 500 100000] [--repeats 15]
+"""
+
+import argparse
+import itertools
+from collections.abc import Callable
+
+import jax
+import machine
+import numpy as np
+import scipy.optimize
+from peer import Problem, from_sine
+
+import fitmat as fm
+from fitmat.instrument import noise
+from fitmat.likelihood import Data, first_discrepancy, prepare, residuals
+from fitmat.measurement import Measurements
+from fitmat.params import space, vector, with_vector
+from fitmat.solver import Minimum, least_squares
+
+TRUTH = {"kd": 0.3, "ks": 1.0, "alpha": 0.2, "eta": 1.5}
+START = {"kd": 0.45, "ks": 0.7, "alpha": 0.28, "eta": 1.9}
+"""27 to 50 % away from the truth."""
+
+INCIDENCES = {500: 5, 100_000: 100}
+SAME = 1e-5
+"""Largest relative difference of the parameters that two converged fits may have."""
+
+
+def measured(rows: int, seed: int = 1) -> Measurements:
+    """About `rows` simulated samples, 2 % noise: several incidences, outgoing angles over ±80°."""
+    count = INCIDENCES.get(rows, max(5, round(np.sqrt(rows / 10))))
+    theta_i, theta_o = np.linspace(10, 75, count), np.linspace(-80, 80, rows // count)
+    truth = fm.model("lambert+ggx", channels=1, **TRUTH)
+    noise = {"relative_noise": 0.02, "absolute_noise": 1e-3}
+    return fm.simulate(truth, np.deg2rad(theta_i), np.deg2rad(theta_o), seed=seed, **noise)
+
+
+def problem(m: Measurements) -> Problem:
+    """The same samples for numpy."""
+    assert m.sigma is not None
+    return Problem(m.wi, m.wo, m.value[:, 0], m.sigma[:, 0])
+
+
+def ours(data: Data, s: jax.Array) -> tuple[Callable[[], Minimum], Callable[[Minimum], np.ndarray]]:
+    """One warm fit, to call; and its parameters."""
+    template = fm.model("lambert+ggx", channels=1, **START)
+    coordinates = space(template)
+
+    def residual(u: jax.Array, args: tuple[Data, jax.Array]) -> jax.Array:
+        return residuals(with_vector(template, coordinates.from_free(u)), *args)
+
+    solve = jax.jit(lambda u, data, s: least_squares(residual, u, (data, s)))
+    start = coordinates.to_free(vector(template))
+    return (
+        lambda: jax.block_until_ready(solve(start, data, s)),
+        lambda end: np.asarray(coordinates.from_free(end.x)),
+    )
+
+
+def scipys(peer: Problem, s: float, start: np.ndarray) -> Callable[[], scipy.optimize.OptimizeResult]:
+    """One fit by MINPACK with finite differences, scipy's defaults, to call."""
+
+    def run() -> scipy.optimize.OptimizeResult:
+        data, calls = peer.stabilised(peer.x, s), itertools.count()
+
+        def residual(u: np.ndarray) -> np.ndarray:
+            next(calls)
+            return peer.residuals(from_sine(u), data, s)
+
+        solution = scipy.optimize.least_squares(residual, start, method="lm")
+        solution["calls"] = next(calls)  # nfev leaves out the finite differences
+        return solution
+
+    return run
+
+
+def main() -> None:
+    """Time, check and print."""
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--rows", type=int, nargs="+", default=[500, 100_000], help="numbers of samples")
+    options.add_argument("--repeats", type=int, default=15, help="timed runs of each rival")
+    options.add_argument("--no-whole", action="store_true", help="leave out the whole fitmat.fit")
+    chosen = options.parse_args()
+    jax.config.update("jax_enable_x64", True)
+    print(machine.described(), "\n")
+    for rows in chosen.rows:
+        race(rows, chosen.repeats, whole=not chosen.no_whole)
+
+
+def race(rows: int, repeats: int, *, whole: bool) -> None:
+    """Both fits of `rows` samples, in turn."""
+    m = measured(rows)
+    data = prepare(m, noise(m))
+    s = first_discrepancy(data)
+    template = fm.model("lambert+ggx", channels=1, **START)
+    start = np.asarray(space(template).to_free(vector(template)))
+    one, values = ours(data, s)
+    other = scipys(problem(m), float(s), start)
+    end, solution = one(), other()
+    found = values(end), from_sine(solution.x)
+    difference = float(np.max(np.abs(found[0] / found[1] - 1.0)))
+    print(f"{m.n_samples} rows, s = {float(s):.3g} sr^(-1/3)")
+    print("parameters  " + "  ".join(TRUTH))
+    print("truth       " + "  ".join(f"{v:.10g}" for v in TRUTH.values()))
+    print("fitmat      " + "  ".join(f"{v:.10g}" for v in found[0]))
+    print("scipy lm    " + "  ".join(f"{v:.10g}" for v in found[1]))
+    print(f"largest relative difference {difference:.1e}")
+    assert difference < SAME, "the two fits do not agree: no race"
+    names = ("fitmat, one start", "scipy lm, one start", "fitmat.fit, whole")
+    rivals: dict[str, Callable[[], object]] = {names[0]: one, names[1]: other}
+    work = {names[0]: f"{int(end.steps)} iterations", names[1]: f"{solution.nfev} steps, {solution.calls} evaluations"}
+    if whole:
+        fitted = fm.fit(m, "lambert+ggx")
+        rivals[names[2]] = lambda: fm.fit(m, "lambert+ggx")
+        work[names[2]] = f"{fitted.n_starts} starts, best {fitted.steps} iterations, {fitted.result}"
+    seconds = machine.interleaved(rivals, repeats)
+    median = {name: float(np.median(taken)) for name, taken in seconds.items()}
+    machine.show(
+        f"{m.n_samples} rows, medians of {repeats}",
+        ["", "median", "fastest", "scipy takes", "work"],
+        [
+            [name, machine.duration(median[name]), machine.duration(seconds[name].min()),
+             f"{median[names[1]] / median[name]:.2f} ×", work[name]]
+            for name in rivals
+        ],
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,65 @@
+"""A folder of results: its default name, and how it appears, complete or not at all.
+
+Knows nothing of what is in it.
+"""
+
+import contextlib
+import itertools
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from fitmat.errors import OutputError
+
+
+def default(source: Path) -> Path:
+    """`NAME-fitmat` beside the input, or the first `NAME-fitmat-2`, `-3`, … that does not exist."""
+    first = source.parent / f"{source.stem}-fitmat"
+    if not os.path.exists(first):
+        return first
+    return next(p for k in itertools.count(2) if not os.path.exists(p := first.with_name(f"{first.name}-{k}")))
+
+
+@contextlib.contextmanager
+def new(target: Path, *, force: bool = False, stale: str = "") -> Iterator[Path]:
+    """A folder to write into that appears as `target`, complete, when the block ends well.
+
+    Args:
+        target: The folder to make.
+        force: Replace the files of an earlier run in `target`.
+        stale: Pattern of names; of the earlier run's files that match, those that the block does not write are removed.
+
+    Raises:
+        OutputError: `target` holds something and `force` is off, or the disk refuses.
+    """
+    try:
+        if target.exists() and (not target.is_dir() or any(target.iterdir())) and not force:
+            raise OutputError(f"{target} already exists; give another --out DIR, or --force to replace the run in it.")
+        place = next(p for p in (target, *target.absolute().parents) if p.exists())
+        draft = Path(tempfile.mkdtemp(prefix=".fitmat-", dir=place))
+    except OSError as error:
+        raise OutputError(f"cannot write {target}: {_reason(error)}; choose another place with --out.") from error
+    try:
+        yield draft
+        _move(draft, target, stale)
+    except OSError as error:
+        raise OutputError(f"cannot write {target}: {_reason(error)}; the report is not there.") from error
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def _move(draft: Path, target: Path, stale: str) -> None:
+    """Move the draft's files into place, and remove what is stale."""
+    target.mkdir(parents=True, exist_ok=True)
+    written = {item.name for item in draft.iterdir()}
+    for name in sorted(written):
+        os.replace(draft / name, target / name)
+    for old in target.glob(stale) if stale else ():
+        if old.name not in written:
+            old.unlink()
+
+
+def _reason(error: OSError) -> str:
+    return error.strerror or str(error)

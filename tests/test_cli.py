@@ -1,0 +1,446 @@
+"""The command line as a stranger meets it: exit codes, one clear sentence for wrong input, no traceback, no litter."""
+
+import errno
+import json
+import logging
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from fitmat import cli, console
+
+DATA = Path(__file__).parents[1] / "data" / "synthetic"
+HEAD = "theta_i,theta_o,brdf\n"
+QUICK = ("--models", "lambert", "--no-mcmc")
+
+
+class Ended(NamedTuple):
+    """How a command ended."""
+
+    code: int
+    out: str
+    err: str
+
+
+Run = Callable[..., Ended]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Run]:
+    """Run `fitmat ARGUMENTS` in this process."""
+
+    def call(*arguments: object) -> Ended:
+        monkeypatch.setattr(sys, "argv", ["fitmat", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        return Ended(int(end.value.code or 0), *capsys.readouterr())
+
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
+    monkeypatch.setattr(os, "_exit", sys.exit)
+    monkeypatch.setenv("COLUMNS", "80")
+    handler = signal.getsignal(signal.SIGINT)
+    yield call
+    signal.signal(signal.SIGINT, handler)
+    logging.disable(logging.NOTSET)
+
+
+@pytest.fixture(scope="session")
+def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """For subprocesses: their compiled programs are kept apart from the user's."""
+    return os.environ | {"XDG_CACHE_HOME": str(tmp_path_factory.mktemp("cache")), "COLUMNS": "80"}
+
+
+def curves(value: Callable[[int, int], float] = lambda i, o: 0.1 + 0.001 * o, theta_o: Any = range(-80, 81, 10)) -> str:
+    """A table of three in-plane curves."""
+    return HEAD + "".join(f"{i},{o},{value(i, o):.6g}\n" for i in (10, 30, 60) for o in theta_o)
+
+
+BAD: dict[str, tuple[str | bytes, str]] = {
+    "0 bytes": (b"", r"bad\.csv: the file is empty \(0 bytes\)"),
+    "header only": (HEAD, r"bad\.csv: a header and no rows"),
+    "one row": (HEAD + "30,30,0.5\n", r"1 valid samples, but lambert has 1 free parameters and needs at least 3"),
+    "fewer samples than parameters": (HEAD + "30,30,1\n30,40,1\n", "2 valid samples, but lambert has 1 free"),
+    "all rows masked": (HEAD + "30,95,1\n30,40,nan\n", r"every row is masked \(1 at or below the horizon, 1 value miss"),
+    "unknown columns": ("a,b,c\n1,2,3\n", "the columns are a, b, c, expected theta_i .*--columns"),
+    "missing quantity": ("theta_i,theta_o,I\n30,45,1\n", "expected a measured quantity: brdf, brdf_cos"),
+    "text in a number": (HEAD + "30,45,1\n30,50,abc\n", r"bad\.csv row 3: brdf = abc, expected a number\. Correct"),
+    "beyond 180 degrees": (HEAD + "30,450,1\n", "row 2: theta_o = 450, expected −180 to 180 degrees"),
+    "radians": (curves(theta_o=np.linspace(-1.3, 1.3, 9)).replace("\n10,", "\n0.1,").replace("\n30,", "\n0.5,")
+                .replace("\n60,", "\n1.1,"), "they look like radians. Confirm with --angle-unit"),
+    "binary": (bytes(range(256)), "a binary file or an unknown encoding"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("content", "sentence"), BAD.values(), ids=BAD)
+def test_bad_file(run, tmp_path, content, sentence):
+    path = tmp_path / "bad.csv"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    assert_refused(run("fit", path, *QUICK), sentence)
+    assert os.listdir(tmp_path) == ["bad.csv"]
+
+
+def assert_refused(ended: Ended, sentence: str, code: int = 1) -> None:
+
+    assert ended.code == code
+    assert ended.out == ""
+    assert ended.err.startswith("fitmat: ")
+    assert ended.err.count("\n") == 1
+    assert re.search(sentence, ended.err), ended.err
+
+
+BAD_ARGUMENTS: dict[str, tuple[tuple[str, ...], str]] = {
+    "directory": (("fit", "."), "a directory, expected a file"),
+    "no such file": (("fit", "none.csv"), r"none\.csv: no such file"),
+    "no model": (("fit", "sparse.csv", "--models", ","), "no model given; try --models"),
+    "unknown lobe": (("fit", "sparse.csv", "--models", "lambert+ggg"), "no lobe 'ggg'; known lobes are lambert, phong"),
+    "same lobe twice": (("fit", "sparse.csv", "--models", "ggx+ggx"), "the same lobe twice"),
+    "unknown parameter": (("fit", "sparse.csv", "--fix", "zz=1"), "--fix zz: no model of .* they have alpha, eta"),
+    "not an assignment": (("fit", "sparse.csv", "--fix", "ks"), "--fix 'ks': expected NAME=NUMBER"),
+    "out of range": (("fit", "sparse.csv", "--fix", "kd=9", *QUICK), "parameter kd = 9: expected a value from 0 to 1"),
+    "no masking": (("fit", "sparse.csv", *QUICK, "--masking", "separable"), "none of lambert has a masking"),
+    "unknown masking": (("fit", "sparse.csv", "--masking", "x"), "masking 'x': expected one of correlated"),
+    "unknown quantity": (("fit", "sparse.csv", "--quantity", "x"), r"quantity = 'x' \(--quantity\), expected 'brdf'"),
+    "unknown column": (("fit", "sparse.csv", "--columns", "brdf=I"), "no column 'I'; the columns are"),
+    "out is a file": (("fit", "sparse.csv", "--out", "sparse.csv"), r"sparse\.csv already exists; give another --out"),
+    "out below a file": (("fit", "sparse.csv", "--out", "sparse.csv/x"), "cannot write .*: Not a directory; choose"),
+    "out not writable": (("fit", "sparse.csv", "--out", "/proc/x"), "cannot write /proc/x: .*; choose another place"),
+    "name too long": (("fit", "sparse.csv", "--out", "a" * 300), "File name too long; choose another place"),
+    "no manual": (("models", "foo"), "no lobe 'foo'; known lobes"),
+    "simulate nothing": (("simulate",), r"name a model to simulate, for example lambert\+ggx"),
+    "simulate unknown": (("simulate", "lambert", "--set", "x=1"), "has no parameter 'x'; it has kd"),
+    "two values of a shared parameter": (
+        ("simulate", "ggx", "--set", "alpha=0.1,0.2"),
+        "parameter alpha has 2 values: expected 1, it is shared",
+    ),
+    "unlike channels": (
+        ("simulate", "lambert+ggx", "--set", "kd=1,1", "--set", "ks=1,1,1"),
+        "kd has 2 values: expected 1 or 3",
+    ),
+    "half a range": (("simulate", "lambert", "--theta-o", "1:2"), "--theta-o '1:2': expected a list 10,30,60 or"),
+    "falling range": (("simulate", "lambert", "--theta-o", "9:1:1"), "expected angles from -90 .* rising order"),
+    "endless range": (("simulate", "lambert", "--theta-o", "0:80:1e-9"), "expected at most 10000 angles"),
+    "negative incidence": (
+        ("simulate", "lambert", "--theta-i", "-5"),
+        "--theta-i '-5': expected angles from 0 to below",
+    ),
+    "not a number": (("simulate", "lambert", "--theta-i", "nan"), "--theta-i 'nan': expected angles from 0"),
+    "simulate onto a folder": (("simulate", "lambert", "--out", "."), "already exists; give another name, or --force"),
+    "simulate to nowhere": (("simulate", "lambert", "--out", "/proc/x.csv"), "cannot be written"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "sentence"), BAD_ARGUMENTS.values(), ids=BAD_ARGUMENTS)
+def test_bad_arguments(run, tmp_path, monkeypatch, arguments, sentence):
+    monkeypatch.chdir(tmp_path)
+    Path("sparse.csv").write_bytes((DATA / "sparse.csv").read_bytes())
+    assert_refused(run(*arguments), sentence)
+    assert os.listdir() == ["sparse.csv"]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("fit",),
+        ("bogus",),
+        ("fit", "x.csv", "--bogus"),
+        ("fit", "x.csv", "--seed", "-1"),
+        ("simulate", "--noise", "nan"),
+    ],
+    ids=" ".join,
+)
+def test_wrong_usage(run, arguments):
+    ended = run(*arguments)
+    assert ended.code == 2
+    assert ended.out == ""
+    assert "--help' for help" in ended.err
+
+
+def test_odd_rows_are_kept_or_masked_and_counted(run, tmp_path):
+    path = tmp_path / "odd.csv"
+    extra = "30,30,nan\n30,31,inf\n30,97,1\n30,32,-0.1\n30,33,0\n10,10,0.11\n"
+    path.write_text(curves(lambda i, o: 0.1 + 1e-4 * ((7 * o + i) % 13)) + extra)
+    ended = run("fit", path, *QUICK, "--out", tmp_path / "out")
+    assert ended.code == 0
+    for sentence in (
+        "1 masked: value missing or NaN",
+        "1 masked: value infinite",
+        "1 masked: at or below the horizon",
+        "Rows that repeat an earlier geometry, all kept: 1.",
+        "Negative values kept as noise: 1.",
+    ):
+        assert sentence in ended.out
+    found = json.loads((tmp_path / "out" / "fit.json").read_text())
+    assert found["n_samples"] == 57
+    assert found["n_masked"] == sum(found["masked"].values()) == 3
+
+
+LABELLED: dict[str, tuple[str, tuple[str, ...], str]] = {
+    "all zero": (curves(lambda i, o: 0), ("at_bound",), "Noise unknown"),
+    "all negative": (curves(lambda i, o: -1 - 0.01 * (o % 3)), ("at_bound", "unidentifiable"), "kept as noise: 51"),
+    "rows copied": (curves() + curves()[len(HEAD) :], ("converged",), "or exact copies"),
+    "one theta_o": (curves(theta_o=(40,) * 17), ("converged",), "Rows that repeat"),
+    "tiny": (curves(lambda i, o: 1e-200), ("nonfinite", "at_bound", "unidentifiable"), "51 samples"),
+    "huge": (curves(lambda i, o: 1e200 * (1 + 0.01 * (o % 3))), ("at_bound", "unidentifiable", "nonfinite"), "51 samp"),
+}
+
+
+@pytest.mark.parametrize(("content", "results", "words"), LABELLED.values(), ids=LABELLED)
+def test_hopeless_data_end_in_a_labelled_result(run, tmp_path, content, results, words):
+    path = tmp_path / "odd.csv"
+    path.write_text(content)
+    ended = run("fit", path, *QUICK)
+    found = json.loads((tmp_path / "odd-fitmat" / "fit.json").read_text())
+    assert found["fits"][0]["result"] in results
+    assert ended.code == (0 if found["fits"][0]["result"] == "converged" else 3)
+    assert ended.err == ""
+    assert words in ended.out
+    assert "nan" not in ended.out.replace("value missing or NaN", "")
+
+
+def test_nothing_finite_has_no_match(run, tmp_path):
+    """Both default models on values beneath the floats' range: labelled, with a report, not compared."""
+    path = tmp_path / "tiny.csv"
+    path.write_text(curves(lambda i, o: 0))
+    ended = run("fit", path, "--no-mcmc", "--json")
+    assert ended.code == 3
+    assert strict(ended.out)["match"] is None
+    assert (tmp_path / "tiny-fitmat" / "report.html").exists()
+
+
+def strict(text: str) -> dict[str, Any]:
+    """One JSON object, without the NaN that Python allows."""
+
+    def refuse(token: str) -> None:
+        raise AssertionError(f"{token} is not JSON")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+@pytest.mark.parametrize("step", ["write_text", "write_bytes", "replace"])
+def test_full_disk(run, tmp_path, monkeypatch, step):
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os if step == "replace" else Path, step, refuse)
+    ended = run("fit", DATA / "sparse.csv", *QUICK, "--out", tmp_path / "a" / "b")
+    assert_refused(ended, "cannot write .*: No space left on device; the report is not there")
+    assert [path for path in tmp_path.rglob("*") if path.is_file() or path.name.startswith(".")] == []
+
+
+def test_out_is_refused_then_replaced_by_force(run, tmp_path):
+    out = tmp_path / "out"
+    assert run("fit", DATA / "sparse.csv", *QUICK, "--out", out).code == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    assert sorted(before) == ["fit.json", "posterior-lambert.nc", "report.html"]
+    assert_refused(
+        run("fit", DATA / "noisy.csv", *QUICK, "--out", out), "already exists; give another --out DIR, or --f"
+    )
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    (out / "notes.txt").write_text("mine")
+    other = ("--models", "lambert+phong", "--fix", "exponent=20", "--fix", "ks=0.1", "--no-mcmc")
+    assert run("fit", DATA / "sparse.csv", *other, "--out", out, "--force").code in (0, 3)
+    names = sorted(path.name for path in out.iterdir())
+    assert names == ["fit.json", "notes.txt", "posterior-lambert+phong.nc", "report.html"]
+
+
+def test_default_folder_is_numbered(run, tmp_path):
+    path = tmp_path / "a.b.csv"
+    path.write_bytes((DATA / "sparse.csv").read_bytes())
+    for name in ("a.b-fitmat", "a.b-fitmat-2", "a.b-fitmat-3"):
+        ended = run("fit", path, *QUICK, "--fix", "kd=0.3")
+        assert f"{name}/report.html" in ended.out
+        assert (tmp_path / name / "fit.json").exists()
+    assert len(os.listdir(tmp_path)) == 4
+
+
+def test_same_seed_same_numbers(run, tmp_path):
+    written = []
+    for name, seed in (("one", 5), ("two", 5), ("three", 6)):
+        ended = run(
+            "fit", DATA / "sparse.csv", "--models", "lambert", "--seed", seed, "--out", tmp_path / name, "--json"
+        )
+        written.append((tmp_path / name / "fit.json").read_text())
+        assert ended == (0, written[-1], "")
+    assert written[0] == written[1] != written[2]
+
+
+def test_interrupted_sampling_keeps_what_is_done(run, tmp_path, monkeypatch):
+    sample = console.sample
+
+    def interrupted(found: Any, *, seed: int, progress: Callable[[int, int], None]) -> Any:
+        def tick(done: int, total: int) -> None:
+            signal.raise_signal(signal.SIGINT)
+            progress(done, total)
+
+        return sample(found, seed=seed, progress=tick)
+
+    monkeypatch.setattr(console, "sample", interrupted)
+    ended = run("fit", DATA / "sparse.csv", "--models", "lambert,lambert+phong", "--out", tmp_path / "out")
+    assert ended.code == 3
+    assert ended.err == ""
+    assert "interrupted: sampling was stopped; what was done is kept." in ended.out
+    first, second = (f["posterior"] for f in json.loads((tmp_path / "out" / "fit.json").read_text())["fits"])
+    assert first["interrupted"]
+    assert first["steps"] == 100
+    assert second["verdict"] == "not sampled"
+    assert "sampling was interrupted" in (tmp_path / "out" / "report.html").read_text()
+
+
+@pytest.mark.parametrize("room", ["fit", "compare"])
+def test_interrupted_computation_leaves_nothing(run, tmp_path, monkeypatch, room):
+    def interrupt(*_: object, **__: object) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(console, room, interrupt)
+    ended = run("fit", DATA / "sparse.csv", "--no-mcmc", "--out", tmp_path / "out")
+    assert_refused(ended, "interrupted before the end; no report was written", code=130)
+    assert os.listdir(tmp_path) == []
+
+
+def test_interrupt_while_a_module_loads(run, monkeypatch):
+    """Extension modules turn Ctrl-C into an ImportError without a cause."""
+
+    def load() -> None:
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        raise ImportError("Encountered an error while initializing the extension.")
+
+    monkeypatch.setattr(cli, "_setup", load)
+    assert_refused(run("fit", DATA / "sparse.csv"), "interrupted before the end", code=130)
+
+
+def test_interrupt_lost_in_a_callback_is_sent_again(run):
+    run("models", "lambert")
+    lost = (KeyboardInterrupt, KeyboardInterrupt(), None, None, None)
+    with pytest.raises(KeyboardInterrupt):
+        sys.unraisablehook(type("Lost", (), {"exc_type": lost[0]})())
+        time.sleep(1)
+
+
+def test_simulate_and_fit_agree(run, tmp_path):
+    path = tmp_path / "new" / "paint.csv"
+    truth = ("--set", "kd=0.4,0.1,0.2", "--set", "alpha=0.3", "--theta-i", "20,45,70", "--theta-o", "-80:80:10")
+    ended = run("simulate", "lambert+ggx", *truth, "--seed", 3, "--out", path)
+    assert ended == (0, f"{path}\n", "")
+    assert path.read_text().startswith("# simulated lambert+ggx; noise 0.02 relative + 0.001 sr^-1, seed 3\n")
+    assert_refused(run("simulate", "lambert", "--out", path), "already exists; give another name, or --force")
+    ended = run("fit", path, "--models", "lambert+ggx", "--fix", "ks=1", "--no-mcmc", "--json")
+    found = strict(ended.out)
+    assert (ended.code, found["channels"], found["n_samples"]) == (0, ["r", "g", "b"], 51)
+    parameters = found["fits"][0]["parameters"]
+    # 51 samples of 2 %: kd to about 1 %, alpha to about 1 %; four standard deviations.
+    assert parameters["kd"]["value"] == pytest.approx([0.4, 0.1, 0.2], rel=0.04)
+    assert parameters["alpha"]["value"] == pytest.approx(0.3, rel=0.04)
+    assert parameters["ks"]["remark"] == "fixed"
+
+
+def test_simulated_catalogue(run, tmp_path):
+    ended = run("simulate", "--catalogue", tmp_path / "all")
+    assert ended.code == 0
+    assert len(ended.out.splitlines()) == len(os.listdir(tmp_path / "all")) > 20
+    assert_refused(run("simulate", "--catalogue", tmp_path / "all"), "already exists")
+
+
+def test_models_are_listed_and_explained(run):
+    listed = run("models").out
+    assert all(name in listed for name in ("lambert", "blinn-phong", "ggx-schlick", "fitmat models ggx"))
+    page = run("models", "lambert+ggx").out
+    assert all(word in page for word in ("Walter", "alpha", "0.0001 – 1", "η", "References", "kd"))
+    assert max(map(len, page.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("command", [(), ("fit",), ("simulate",), ("models",)], ids=" ".join)
+def test_help_is_complete_at_80_columns(run, command):
+    ended = run(*command, "--help")
+    assert ended.code == 0
+    assert "…│" not in ended.out.replace(" ", "")  # no option is cut off
+    words = {"fit": ("Examples", "report.html", "brdf_550"), "simulate": ("Example", "--set"), "models": ("manual",)}
+    for word in words.get("".join(command), ("Exit codes", "0 all fits converged", "Examples")):
+        assert word in " ".join(ended.out.split())
+
+
+def shell(environment: dict[str, str], *arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "fitmat", *map(str, arguments)]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, **options)
+
+
+def test_start_up_is_light(environment):
+    """Neither `import fitmat` nor --help may load what takes seconds."""
+    heavy = "heavy = {'jax', 'numpy', 'scipy', 'matplotlib', 'emcee', 'polars', 'xarray'} & set(sys.modules)"
+    program = f"""
+import sys, fitmat, fitmat.cli
+sys.argv = ["fitmat", "fit", "--help"]
+try:
+    fitmat.cli.main()
+except SystemExit:
+    {heavy}
+    sys.exit(", ".join(heavy))
+"""
+    ended = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, timeout=60)
+    assert ended.stderr.strip() == ""
+    assert ended.returncode == 0
+
+
+def test_default_run_prints_one_object_and_nothing_else(environment, tmp_path):
+    path = tmp_path / "sparse.csv"
+    path.write_bytes((DATA / "sparse.csv").read_bytes())
+    ended = shell(environment, "fit", path, "--json", "--seed", 1)
+    assert ended.stderr == ""
+    found = strict(ended.stdout)
+    assert ended.returncode == (0 if all(f["result"] == "converged" for f in found["fits"]) else 3)
+    assert [f["model"] for f in found["fits"]] == ["lambert+blinn-phong", "lambert+ggx"]
+    assert all(f["posterior"]["verdict"] in ("reliable", "tentative") for f in found["fits"])
+    assert sorted(os.listdir(tmp_path / "sparse-fitmat")) == [
+        "fit.json",
+        "posterior-lambert+blinn-phong.nc",
+        "posterior-lambert+ggx.nc",
+        "report.html",
+    ]
+
+
+def test_ctrl_c_while_fitting(environment, tmp_path):
+    command = [sys.executable, "-m", "fitmat", "fit", str(DATA / "sparse.csv"), "--out", str(tmp_path / "out")]
+    running = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 60
+    while not list(tmp_path.iterdir()) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    running.send_signal(signal.SIGINT)
+    out, err = running.communicate(timeout=60)
+    assert_refused(Ended(running.returncode, out, err), "interrupted before the end", code=130)
+    assert os.listdir(tmp_path) == []
+
+
+def test_closed_pipe_and_full_stdout(environment):
+    with subprocess.Popen(
+        [sys.executable, "-m", "fitmat", "models"], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as piped:
+        assert piped.stdout
+        assert piped.stderr
+        piped.stdout.close()
+        assert b"Traceback" not in piped.stderr.read()
+    with open("/dev/full", "w") as full:
+        ended = subprocess.run(
+            [sys.executable, "-m", "fitmat", "models"], env=environment, stdout=full, stderr=subprocess.PIPE, text=True
+        )
+    assert_refused(Ended(ended.returncode, "", ended.stderr), "cannot write the output: No space left on device")
+
+
+def test_terminal_and_names_that_are_not_utf8(environment, tmp_path):
+    path = os.fsdecode(os.fsencode(tmp_path) + b"/\xff[bold]<b>.csv")
+    Path(path).write_bytes((DATA / "sparse.csv").read_bytes())
+    ended = shell(environment | {"PYTHONIOENCODING": "ascii"}, "fit", path, *QUICK)
+    assert ended.returncode == 0
+    assert ended.stderr == ""
+    assert "[bold]<b>.csv: 51 samples" in ended.stdout
+    page = next(tmp_path.glob("*-fitmat/report.html")).read_text()
+    assert "&lt;b&gt;.csv" in page
+    assert "<b>.csv" not in page

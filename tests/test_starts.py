@@ -1,0 +1,85 @@
+"""Where a fit begins: exact non-negative weights against scipy, and a grid that comes near the truth."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from scipy.optimize import nnls
+
+import fitmat as fm
+from fitmat.instrument import noise
+from fitmat.likelihood import Data, prepare
+from fitmat.params import entries
+from fitmat.starts import nonnegative, starting_points
+
+OBJECTIVE = 1e-3
+"""Of |b|²: how much more than scipy may be left; coordinate descent ends within about 1/sweeps = 1/300 in the worst
+case, nearly parallel columns."""
+
+WEIGHTS = 1e-9
+"""Relative; two lobes of a BRDF are far from parallel, and the sweeps converge to rounding."""
+
+_solve = jax.jit(nonnegative)
+
+
+def left(a: np.ndarray, b: np.ndarray, w: np.ndarray) -> float:
+    return float(np.sum((a @ w - b) ** 2))
+
+
+@given(
+    hnp.arrays(float, (8, 3), elements=st.floats(-1, 1, width=16)),
+    hnp.arrays(float, 8, elements=st.floats(-1, 1, width=16)),
+)
+@example(np.ones((8, 3)), np.arange(8.0))  # three times the same lobe
+@example(np.eye(8, 3) * [1, 0, 1], np.ones(8))  # a lobe that no sample sees
+@example(-np.eye(8, 3), np.ones(8))  # every weight wants to be negative
+@example(np.zeros((8, 3)), np.ones(8))
+def test_weights_are_as_good_as_scipys(a: np.ndarray, b: np.ndarray) -> None:
+    w = np.asarray(_solve(a.T @ a, a.T @ b))
+    assert (w >= 0).all()
+    assert left(a, b, w) <= left(a, b, nnls(a, b)[0]) + OBJECTIVE * (b @ b)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_weights_are_scipys_where_they_are_unique(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    a, b = rng.normal(size=(40, 3)), rng.normal(size=40)
+    np.testing.assert_allclose(_solve(a.T @ a, a.T @ b), nnls(a, b)[0], rtol=WEIGHTS, atol=WEIGHTS)
+
+
+@pytest.fixture(scope="module")
+def data() -> Data:
+    truth, theta_o = fm.model("lambert+ggx", kd=0.3, alpha=0.15, eta=1.5), np.deg2rad(np.arange(-80, 81, 10))
+    m = fm.simulate(truth, np.deg2rad([20, 45, 70]), theta_o, relative_noise=0.01, absolute_noise=1e-3, seed=1)
+    return prepare(m, noise(m))
+
+
+def test_the_grid_comes_near_the_truth(data: Data) -> None:
+    """alpha = 0.15 and eta = 1.5 are nodes of the grid; there the weights are solved to the noise."""
+    template = fm.model("lambert+ggx")
+    places = {e.name: e.place.start for e in entries(template)}
+    points = np.asarray(starting_points(template, data, jnp.array(1e-3), {}, 6))
+    assert points.shape == (6, 4)
+    best = points[0]
+    assert (best[places["alpha"]], best[places["eta"]]) == (0.15, 1.5)
+    assert best[places["kd"]] == pytest.approx(0.3, rel=0.01)  # the noise
+    assert best[places["ks"]] == pytest.approx(1.0, rel=0.01)
+
+
+def test_fixed_parameters_stay_and_small_grids_give_fewer_starts(data: Data) -> None:
+    template = fm.model("lambert+ggx")
+    places = {e.name: e.place.start for e in entries(template)}
+    held = {"ks": np.array([0.7]), "alpha": np.array([0.123])}
+    points = np.asarray(starting_points(template, data, jnp.array(1e-3), held, 40))
+    assert len(points) == 6  # the nodes of eta
+    assert set(points[:, places["ks"]]) == {0.7}
+    assert set(points[:, places["alpha"]]) == {0.123}
+    assert len(set(points[:, places["eta"]])) == 6
+
+
+def test_a_model_with_everything_fixed_has_one_start(data: Data) -> None:
+    points = starting_points(fm.model("lambert"), data, jnp.array(1e-3), {"kd": np.array([0.4])}, 6)
+    np.testing.assert_array_equal(points, [[0.4]])

@@ -1,0 +1,263 @@
+"""Posteriors: emcee against importance sampling and Laplace, verdicts, interrupts, files, and coverage of the truth."""
+
+import dataclasses
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import xarray
+from scipy import stats
+
+import fitmat as fm
+from fitmat.errors import FitmatError
+from fitmat.likelihood import log_likelihood, noise_scale
+from fitmat.outcome import Fit
+from fitmat.params import space, vector
+from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, Diagnostics, Posterior, split_rhat
+from fitmat.uncertainty import log_posterior
+
+QUANTILE = 0.15
+"""In standard deviations: three Monte Carlo errors, 2.7/√ESS, of an outer quantile from about 1600 effective draws,
+rounded down from 0.2 because the seeds are fixed."""
+
+GAUSSIAN = 0.06
+"""Relative: three errors, 1/√(2·1200), of a standard deviation from 1200 effective draws."""
+
+REPEATS, AT_LEAST = 100, 0.88
+"""95 % intervals of a correct program cover fewer than 88 of 100 truths for one choice of seeds in 250."""
+
+TRUTH = {"kd": 0.3, "ks": 1.0, "alpha": 0.3, "eta": 1.5}
+
+
+def seen(seed: int) -> fm.Measurements:
+    theta_o = np.deg2rad(np.arange(-80, 81, 10))
+    truth = fm.model("lambert+ggx", **TRUTH)
+    return fm.simulate(truth, np.deg2rad([20, 45, 70]), theta_o, relative_noise=0.02, absolute_noise=1e-3, seed=seed)
+
+
+@pytest.fixture(scope="module")
+def fit() -> Fit:
+    return fm.fit(seen(1), "lambert+ggx")
+
+
+@pytest.fixture(scope="module")
+def sampled(fit: Fit) -> Posterior:
+    return fm.sample(fit, seed=1)
+
+
+def natural(fit: Fit, values: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """Sampled coordinates: kd, ks, ln alpha, ln eta, s."""
+    return np.column_stack([values[:, :2], np.log(values[:, 2:]), s])
+
+
+def test_the_target_is_likelihood_times_flat_priors(fit: Fit) -> None:
+    inside = natural(fit, fit.values[None] * 1.01, np.array([0.002]))
+    moved = [fm.model("lambert+ggx", channels=1, **dict(zip(TRUTH, fit.values * 1.01, strict=True)))]
+    expected = float(log_likelihood(moved[0], fit.data, jnp.array(0.002)))
+    assert log_posterior(fit)(inside) == pytest.approx([expected], rel=1e-9)  # rounding of exp and log
+    outside = np.tile(inside, (5, 1)) + np.diag([1.0, -2.0, 5.0, -1.0, -1.0])
+    assert np.isneginf(log_posterior(fit)(outside)).all()
+
+
+def test_the_moves_leave_the_target_as_it_is(fit: Fit, sampled: Posterior) -> None:
+    """Quantiles by importance sampling of 40,000 draws, a method without chains; only the target is shared."""
+    rng, count = np.random.default_rng(1), 40_000
+    scale = np.where(space(fit.model).log, fit.values, 1.0)
+    centre, shape = natural(fit, fit.values[None], np.zeros(1))[0, :4], fit.covariance / np.outer(scale, scale)
+    wide = stats.multivariate_t(centre, 1.5 * shape, df=5, seed=rng)
+    folded = stats.halfcauchy(scale=0.2 * float(noise_scale(fit.data)))
+    drawn = np.column_stack([wide.rvs(count), folded.rvs(count, random_state=rng)])
+    logs = log_posterior(fit)(drawn) - wide.logpdf(drawn[:, :4]) - folded.logpdf(drawn[:, 4])
+    weight = np.exp(logs - logs.max())
+    weight /= weight.sum()
+    assert 1 / np.sum(weight**2) > 2000  # the effective number of draws: the reference is sharper than the chain
+    chain = natural(fit, sampled.values, sampled.discrepancy)
+    for k in range(5):
+        order = np.argsort(drawn[:, k])
+        places = np.searchsorted(np.cumsum(weight[order]), [0.025, 0.25, 0.5, 0.75, 0.975])
+        difference = np.quantile(chain[:, k], [0.025, 0.25, 0.5, 0.75, 0.975]) - drawn[order[places], k]
+        assert np.abs(difference).max() < QUANTILE * chain[:, k].std()
+
+
+def test_emcee_agrees_with_laplace_where_the_posterior_is_gaussian() -> None:
+    """1,000 samples of a Lambert surface with a planted misfit: albedo and s are both well determined."""
+    rng, theta = np.random.default_rng(1), np.linspace(0.0, 1.2, 1000)
+    root = np.cbrt(0.1 * np.cos(theta)) + 0.02 * rng.normal(size=theta.shape)
+    m = fm.from_arrays(theta, 0.5, root**3 / np.cos(theta), sigma=np.full(theta.shape, 1e-4))
+    found = fm.fit(m, "lambert")
+    chain, gauss = fm.sample(found, seed=2), fm.laplace(found, seed=2)
+    sd = np.sqrt(found.covariance[0, 0])
+    for posterior in (chain, gauss):
+        assert posterior.sd()[0] == pytest.approx(sd, rel=GAUSSIAN)
+        assert abs(posterior.values[:, 0].mean() - found.values[0]) < GAUSSIAN * 1.5 * sd
+        assert posterior.discrepancy.mean() == pytest.approx(0.02, rel=3 / np.sqrt(2000))  # three errors of an sd
+        assert posterior.discrepancy.std() == pytest.approx(0.02 / np.sqrt(2000), rel=2 * GAUSSIAN)
+
+
+def test_the_seed_is_the_chain(fit: Fit) -> None:
+    first, same, other = (fm.sample(fit, seed=seed, max_steps=20).values for seed in (5, 5, 6))
+    np.testing.assert_array_equal(first, same)
+    assert not np.any(first[:, 0] == other[:, 0])
+    one, again, two = (fm.laplace(fit, seed=seed).values for seed in (5, 5, 6))
+    np.testing.assert_array_equal(one, again)
+    assert not np.any(one == two)
+
+
+def test_a_finished_chain_is_reliable(sampled: Posterior) -> None:
+    d = sampled.diagnostics
+    assert d is not None
+    assert sampled.verdict == "reliable"
+    assert d.steps - d.burn_in >= ENOUGH_TAU * d.tau.max()
+    assert d.ess.min() >= ENOUGH_ESS
+    assert d.rhat.max() <= GOOD_RHAT
+    assert 0.2 < d.acceptance < 0.9
+    assert sampled.chain is not None
+    assert sampled.chain.shape == (d.steps - d.burn_in, 32, 5)
+    np.testing.assert_array_equal(sampled.chain[..., :4].reshape(-1, 4), sampled.values)
+    assert sampled.values.min(axis=0)[3] > 1.0  # eta within its bounds
+
+
+def test_short_chains_are_said_to_be_short(fit: Fit) -> None:
+    assert fm.sample(fit, seed=1, max_steps=8).verdict == "unusable"
+    short = fm.sample(fit, seed=1, max_steps=250)
+    assert short.verdict == "tentative"
+    assert short.usable
+    assert short.diagnostics is not None
+    assert short.diagnostics.steps == 250
+
+
+def diagnosed(sampled: Posterior, **changes: object) -> str:
+    given: dict[str, object] = {"tau": np.full(5, 8.0), "ess": np.full(5, 4000.0), "rhat": np.full(5, 1.01)}
+    given |= {"acceptance": 0.5, "steps": 1040, "burn_in": 40, "walkers": 32, "seed": 1, **changes}
+    return dataclasses.replace(sampled, diagnostics=Diagnostics(**given)).verdict  # pyright: ignore[reportArgumentType]
+
+
+def test_verdicts_follow_their_thresholds(sampled: Posterior) -> None:
+    assert diagnosed(sampled) == "reliable"
+    assert diagnosed(sampled, tau=np.full(5, 21.0)) == "tentative"  # 1000 steps are 48 τ
+    assert diagnosed(sampled, tau=np.full(5, 101.0)) == "unusable"  # fewer than 10 τ
+    assert diagnosed(sampled, tau=np.full(5, np.nan)) == "unusable"
+    assert diagnosed(sampled, ess=np.full(5, 399.0)) == "tentative"
+    assert diagnosed(sampled, rhat=np.full(5, 1.06)) == "tentative"
+    assert diagnosed(sampled, rhat=np.full(5, 1.21)) == "unusable"
+
+
+def test_laplace_is_not_sampled(fit: Fit) -> None:
+    gauss = fm.laplace(fit, seed=1)
+    assert gauss.verdict == "not sampled"
+    assert gauss.usable
+    assert gauss.chain is None
+    sd = np.sqrt(np.diagonal(fit.covariance))
+    np.testing.assert_allclose(gauss.sd(), sd, rtol=GAUSSIAN)
+    middle = gauss.interval(0.6827)
+    np.testing.assert_allclose(middle[:, 1] - middle[:, 0], 2 * sd, rtol=2 * GAUSSIAN)  # ±1 sd of a Gaussian
+
+
+def test_draws_respect_the_bounds() -> None:
+    """Albedo 0.98 ± 0.02: Laplace's Gaussian is folded at 1, emcee's prior ends there."""
+    value = 0.98 / np.pi * (1 + 0.1 * np.random.default_rng(3).normal(size=51))
+    m = fm.from_arrays(np.linspace(0, 1.2, 51), 0.3, value, sigma=np.full(51, 0.1 * 0.98 / np.pi))
+    found = fm.fit(m, "lambert")
+    for posterior in (fm.laplace(found, seed=1), fm.sample(found, seed=1, max_steps=100)):
+        assert 0.999 < posterior.values.max() <= 1.0
+        assert posterior.discrepancy.min() >= 0.0
+
+
+@pytest.mark.parametrize("calls", [1, 2])
+def test_an_interrupt_keeps_what_was_done(fit: Fit, calls: int) -> None:
+    seen: list[tuple[int, int]] = []
+
+    def stop(done: int, expected: int) -> None:
+        seen.append((done, expected))
+        if len(seen) == calls:
+            raise KeyboardInterrupt
+
+    kept = fm.sample(fit, seed=1, max_steps=350, progress=stop)
+    assert kept.interrupted
+    assert kept.diagnostics is not None
+    assert kept.diagnostics.steps == 100 * calls
+    assert [done for done, _ in seen] == [100, 200][:calls]
+    assert all(done <= expected <= 350 for done, expected in seen)
+
+
+def test_an_interrupt_before_the_first_steps_leaves_laplace(fit: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("emcee.EnsembleSampler.run_mcmc", interrupted)
+    kept = fm.sample(fit, seed=1)
+    assert kept.interrupted
+    assert kept.method == "laplace"
+    np.testing.assert_array_equal(kept.values, fm.laplace(fit, seed=1).values)
+
+
+def test_nothing_to_sample_is_said() -> None:
+    m = seen(1)
+    assert m.sigma is not None
+    broken = fm.fit(dataclasses.replace(m, sigma=1e-200 * m.sigma), "lambert+ggx")
+    with pytest.raises(FitmatError, match=r"lambert\+ggx: the fit ended nonfinite, there is nothing to sample; check "):
+        fm.sample(broken, seed=1)
+    assert fm.laplace(broken, seed=1).verdict == "unusable"
+
+
+def test_split_rhat_by_hand() -> None:
+    """Gelman et al., BDA3, eqs. 11.1–11.4, chain by chain; here with two walkers of four steps."""
+    chain = np.array([[1.0, 5.0], [2.0, 7.0], [4.0, 6.0], [3.0, 9.0]])
+    halves = [[1.0, 2.0], [5.0, 7.0], [4.0, 3.0], [6.0, 9.0]]
+    between = 2 * np.var([np.mean(h) for h in halves], ddof=1)
+    within = np.mean([np.var(h, ddof=1) for h in halves])
+    by_hand = np.sqrt((within * (2 - 1) / 2 + between / 2) / within)
+    assert split_rhat(chain[..., None]) == pytest.approx([by_hand])
+
+
+def test_split_rhat_knows_good_chains_from_bad() -> None:
+    chain = np.random.default_rng(1).normal(size=(500, 16, 3))
+    assert np.abs(split_rhat(chain) - 1).max() < 0.01
+    assert split_rhat(chain + np.linspace(0, 2, 16)[:, None]).min() > 1.1  # walkers that disagree
+    assert split_rhat(chain + np.linspace(0, 2, 500)[:, None, None]).min() > 1.1  # walkers that still drift
+    assert np.isnan(split_rhat(np.zeros((500, 16, 1)))).all()  # stuck
+
+
+def test_thinning_spreads_over_the_run(sampled: Posterior) -> None:
+    values, s = sampled.thinned(10)
+    assert values.shape == (10, 4)
+    assert s.shape == (10,)
+    np.testing.assert_array_equal(values[[0, -1]], sampled.values[[0, -1]])
+    assert len(dataclasses.replace(sampled, values=sampled.values[:3]).thinned(10)[0]) == 3
+
+
+def test_draws_are_saved_as_arviz_reads_them(fit: Fit, sampled: Posterior, tmp_path: Path) -> None:
+    for posterior in (sampled, fm.laplace(fit, seed=1)):
+        path = tmp_path / f"{posterior.method}.nc"
+        posterior.save(path)
+        with xarray.open_datatree(path, engine="h5netcdf") as tree:
+            group = tree["posterior"].load()
+            assert set(group.data_vars) == {*TRUTH, "discrepancy"}
+            assert group["alpha"].dims == ("chain", "draw")
+            chains = group["alpha"].transpose("draw", "chain").values
+            np.testing.assert_array_equal(chains.ravel(), posterior.values[:, 2])
+            np.testing.assert_array_equal(group["discrepancy"].values.T.ravel(), posterior.discrepancy)
+            assert group.attrs["model"] == "lambert+ggx"
+            assert group.attrs["verdict"] == posterior.verdict
+    assert group["alpha"].shape == (1, 2000)
+
+
+def test_fixed_parameters_are_not_saved_but_stay_in_the_draws(tmp_path: Path) -> None:
+    m = fm.from_arrays(np.linspace(0, 1.2, 51), 0.3, np.full(51, 0.1), sigma=np.full(51, 0.01))
+    held = fm.laplace(fm.fit(m, "lambert", fixed={"kd": 0.3}), seed=1)
+    assert set(held.values[:, 0]) == {0.3}
+    held.save(tmp_path / "held.nc")
+    with xarray.open_datatree(tmp_path / "held.nc", engine="h5netcdf") as tree:
+        assert set(tree["posterior"].data_vars) == {"discrepancy"}
+
+
+def test_intervals_cover_the_truth() -> None:
+    """emcee's 95 % intervals of all four parameters, over files that differ by their noise alone."""
+    truth, covered = np.array(list(TRUTH.values())), np.zeros(4)
+    for seed in range(REPEATS):
+        low, high = fm.sample(fm.fit(seen(1000 + seed), "lambert+ggx"), seed=seed, max_steps=300).interval().T
+        covered += (low <= truth) & (truth <= high)
+    print("\ncovered:", dict(zip(TRUTH, covered / REPEATS, strict=True)))
+    assert covered.min() / REPEATS >= AT_LEAST
+    assert vector(fm.model("lambert+ggx", **TRUTH)).tolist() == truth.tolist()
