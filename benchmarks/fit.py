@@ -18,11 +18,12 @@ import scipy.optimize
 from peer import Problem, from_sine
 
 import fitmat as fm
+from fitmat.fitting import Chart, descend
 from fitmat.instrument import noise
-from fitmat.likelihood import Data, first_discrepancy, prepare, residuals
+from fitmat.likelihood import Data, first_discrepancy, prepare
 from fitmat.measurement import Measurements
-from fitmat.params import space, vector, with_vector
-from fitmat.solver import Minimum, least_squares
+from fitmat.params import space, vector
+from fitmat.solver import Minimum
 
 TRUTH = {"kd": 0.3, "ks": 1.0, "alpha": 0.2, "eta": 1.5}
 START = {"kd": 0.45, "ks": 0.7, "alpha": 0.28, "eta": 1.9}
@@ -51,16 +52,12 @@ def problem(m: Measurements) -> Problem:
 def ours(data: Data, s: jax.Array) -> tuple[Callable[[], Minimum], Callable[[Minimum], np.ndarray]]:
     """One warm fit, to call; and its parameters."""
     template = fm.model("lambert+ggx", channels=1, **START)
-    coordinates = space(template)
-
-    def residual(u: jax.Array, args: tuple[Data, jax.Array]) -> jax.Array:
-        return residuals(with_vector(template, coordinates.from_free(u)), *args)
-
-    solve = jax.jit(lambda u, data, s: least_squares(residual, u, (data, s)))
-    start = coordinates.to_free(vector(template))
+    chart, values = Chart(template, (0, 1, 2, 3)), vector(template)
+    solve = jax.jit(lambda u, data, s: descend(chart, data, values, u, s))
+    start = chart.free(values)
     return (
         lambda: jax.block_until_ready(solve(start, data, s)),
-        lambda end: np.asarray(coordinates.from_free(end.x)),
+        lambda end: np.asarray(vector(chart.model(values, end.x))),
     )
 
 

@@ -1,15 +1,15 @@
 """The command line: parse, one library call, print. The only room that speaks."""
 
-import _thread
 import io
 import logging
 import os
+import shutil
 import signal
 import sys
 import warnings
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any
 
 import typer
 
@@ -138,6 +138,7 @@ def fit(
     measurements = read(file, **reading, forward=forward, specular_azimuth=specular_azimuth)
     target = out or folder.default(file)
     with folder.new(target, force=force, stale=report.POSTERIOR.format("*")) as draft:
+        _leave_on_interrupt(draft)
         posteriors, match = console.study(
             measurements, names, fixed=fixed, masking=masking, sampling=not no_mcmc, seed=seed
         )
@@ -224,14 +225,8 @@ def models(
 
 def main() -> None:
     """Run the command line; wrong input, a full disk and Ctrl-C become one line on stderr and an exit code."""
-    _prepare()
-    asked: list[int] = []
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        asked.append(number)
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGINT, interrupt)
+    _prepare_streams()
+    _leave_on_interrupt()
     try:
         try:
             app()
@@ -243,43 +238,34 @@ def main() -> None:
         # What could not be written must not be tried again when Python closes stdout.
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         _end(f"cannot write the output: {error.strerror or error}.")
-    except ImportError:
-        # An extension module that Ctrl-C met while it was loading says no more than that it could not load.
-        if not asked:
-            raise
-        _interrupted()
-    except SystemExit as end:
-        if end.code != INTERRUPTED:
-            raise
-        _interrupted()
 
 
-def _prepare() -> None:
+def _prepare_streams() -> None:
     """Keep stderr for what the user must act on, and never fail on a character that the terminal lacks."""
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
     logging.disable(logging.WARNING)
-    sys.unraisablehook = _raise_again
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
 
 
-def _raise_again(lost: "sys.UnraisableHookArgs") -> None:
-    """A Ctrl-C that arrived in a callback of JAX would be lost with a traceback; it is sent once more."""
-    if issubclass(lost.exc_type, KeyboardInterrupt):
-        _thread.interrupt_main()
-    else:
-        sys.__unraisablehook__(lost)
+def _leave_on_interrupt(draft: Path | None = None) -> None:
+    """Let Ctrl-C end the program at once, and its draft with it.
+
+    No exception: raised inside compiled code or while a module loads, it gets lost, turns into another, or crashes.
+    """
+
+    def leave(number: int, frame: FrameType | None) -> None:
+        if draft is not None:
+            shutil.rmtree(draft, ignore_errors=True)
+        sys.stderr.write("fitmat: interrupted before the end; no report was written.\n")
+        sys.stderr.flush()
+        os._exit(INTERRUPTED)
+
+    signal.signal(signal.SIGINT, leave)
 
 
-def _end(message: str) -> NoReturn:
+def _end(message: str) -> None:
     sys.stderr.write(f"fitmat: {message}\n")
     sys.exit(WRONG_INPUT)
-
-
-def _interrupted() -> None:
-    """End at once: Python's own way out may crash while compiled code is still running."""
-    sys.stderr.write("fitmat: interrupted before the end; no report was written.\n")
-    sys.stderr.flush()
-    os._exit(INTERRUPTED)

@@ -78,7 +78,7 @@ def study(
 
 @contextlib.contextmanager
 def _interrupt_later() -> Iterator[list[int]]:
-    """Ctrl-C is noted in the list, not raised in the middle of compiled code; a second one raises."""
+    """Ctrl-C is noted in the list, so that sampling can stop between two steps; a second one is as before."""
     asked: list[int] = []
 
     def note(number: int, frame: FrameType | None) -> None:

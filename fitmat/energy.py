@@ -79,6 +79,10 @@ def directional_albedo(model: AbstractBRDF, theta_i: Float[Array, " k"]) -> Floa
 
 
 def incidence_rule() -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
-    """Incidence angles (radians) and weights of ∫ g(θ_i) c_i dω_i over the hemisphere: Gauss in sin²θ_i."""
+    """Incidence angles (radians) and weights of ∫ g(θ_i) c_i dω_i over the hemisphere: Gauss in cosθ_i.
+
+    Divided by cosθ_i the weights integrate over solid angle.
+    """
     nodes, weights = np.polynomial.legendre.leggauss(INCIDENCE_NODES)
-    return np.arcsin(np.sqrt((nodes + 1) / 2)), np.pi * weights / 2
+    cos = (nodes + 1) / 2
+    return np.arccos(cos), np.pi * weights * cos

@@ -53,10 +53,15 @@ def signed_zenith(wi: np.ndarray, wo: np.ndarray) -> Float[np.ndarray, " n"]:
     return np.where(forward, 1.0, -1.0) * zenith(wo)
 
 
+def _dot(a: Vec3, b: Vec3) -> Scalar:
+    """a·b, written out: XLA fuses sums of components, but not small matrix products."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
 def half_vector(wi: Vec3, wo: Vec3) -> Vec3:
     """h = (ω_i + ω_o)/|ω_i + ω_o|; the normal where the sum vanishes (ω_i = −ω_o)."""
     total = wi + wo
-    square = total @ total
+    square = _dot(total, total)
     usable = square > 1e-24
     safe = jnp.where(usable, square, 1.0)
     return jnp.where(usable, total / jnp.sqrt(safe), jnp.array([0.0, 0.0, 1.0]))
@@ -64,7 +69,7 @@ def half_vector(wi: Vec3, wo: Vec3) -> Vec3:
 
 def cos_difference(wi: Vec3, wo: Vec3) -> Scalar:
     """c_d = ω_i·h = √((1 + ω_i·ω_o)/2), in [0, 1]."""
-    return jnp.sqrt(jnp.clip((1.0 + wi @ wo) / 2.0, _TINY, 1.0))
+    return jnp.sqrt(jnp.clip((1.0 + _dot(wi, wo)) / 2.0, _TINY, 1.0))
 
 
 def mirror(direction: Vec3) -> Vec3:

@@ -12,10 +12,13 @@ gains nothing by inflating itself.
 This room knows no solver, no sampler and no particular model.
 """
 
+from typing import Any
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float
 
 from fitmat._types import Directions, Samples, Scalar
@@ -122,13 +125,19 @@ def stabilised(x: Array, noise: Array, s: Array) -> Array:
     return x / noise * _shape(3.0 * s * _two_thirds(x) / noise)
 
 
-@stabilised.defjvp
-def _stabilised_jvp(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
+def _stabilised_jvp(primals: tuple, tangents: tuple) -> tuple[Array, Any]:
     x, noise, s = primals
     x_dot, _, s_dot = tangents
-    fixed = _two_thirds(x)
-    value, from_s = jax.jvp(lambda t: x / noise * _shape(3.0 * t * fixed / noise), (s,), (s_dot,))
-    return value, x_dot / spread(x, noise, s) + from_s
+    value, change = stabilised(x, noise, s), jnp.zeros(())
+    if not isinstance(x_dot, SymbolicZero):
+        change = x_dot / spread(x, noise, s)
+    if not isinstance(s_dot, SymbolicZero):
+        fixed = _two_thirds(x)
+        change += jax.jvp(lambda t: x / noise * _shape(3.0 * t * fixed / noise), (s,), (s_dot,))[1]
+    return value, jnp.broadcast_to(change, value.shape)
+
+
+stabilised.defjvp(_stabilised_jvp, symbolic_zeros=True)
 
 
 def from_stabilised(z: Array, noise: Array, s: Array) -> Array:
@@ -156,9 +165,13 @@ HALVINGS = 50
 
 def residuals(model: AbstractBRDF, data: Data, s: Scalar) -> Samples:
     """z(y κ) − z(f κ), (n, c), unit variance under the model; 0 where masked."""
+    return residuals_from(stabilised(data.x, data.noise, s), model, data, s)
+
+
+def residuals_from(measured: Samples, model: AbstractBRDF, data: Data, s: Scalar) -> Samples:
+    """`residuals` with z(y κ) given, for loops in which s stays."""
     predicted = evaluate_pairs(model, data.wi, data.wo) * data.kappa
-    difference = stabilised(data.x, data.noise, s) - stabilised(predicted, data.noise, s)
-    return data.weight * difference
+    return data.weight * (measured - stabilised(predicted, data.noise, s))
 
 
 def log_likelihood(model: AbstractBRDF, data: Data, s: Scalar) -> Scalar:

@@ -8,6 +8,7 @@ import html
 
 import numpy as np
 from jaxtyping import Bool, Float
+from numpy.typing import ArrayLike
 
 from fitmat.errors import ReadError
 from fitmat.geometry import from_angles, relative_azimuth, signed_zenith, zenith
@@ -107,12 +108,12 @@ class Measurements:
 
 
 def from_arrays(
-    theta_i: np.ndarray,
-    theta_o: np.ndarray,
-    value: np.ndarray,
+    theta_i: ArrayLike,
+    theta_o: ArrayLike,
+    value: ArrayLike,
     *,
-    phi: np.ndarray | float = np.pi,
-    sigma: np.ndarray | None = None,
+    phi: ArrayLike = np.pi,
+    sigma: ArrayLike | None = None,
     channels: tuple[str, ...] | None = None,
     source: str = "array",
 ) -> Measurements:

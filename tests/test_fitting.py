@@ -35,7 +35,11 @@ TRUTHS: dict[str, dict[str, Any]] = {
     "phong": {"ks": 0.3, "exponent": 20.0},
     "blinn-phong": {"ks": 0.3, "exponent": 20.0},
     "blinn-phong-exact": {"ks": 0.3, "exponent": 20.0},
-    **{f"{lobe}{end}": {"alpha": 0.3, **v} for lobe in ("ggx", "beckmann", "cook-torrance") for end, v in FRESNEL.items()},
+    **{
+        f"{lobe}{end}": {"alpha": 0.3, **v}
+        for lobe in ("ggx", "beckmann", "cook-torrance")
+        for end, v in FRESNEL.items()
+    },
 }
 """Every lobe with parameters that 51 samples determine, once ks of the microfacet lobes is fixed."""
 
@@ -88,7 +92,7 @@ def test_a_model_may_be_fixed_altogether(plastic: fm.Measurements) -> None:
 
 
 def test_colours_have_their_own_weights_and_share_their_shape() -> None:
-    truth = fm.model("lambert+ggx", channels=3, kd=[0.1, 0.3, 0.6], ks=[1.0, 0.8, 0.5], alpha=0.3, eta=1.5)
+    truth = fm.model("lambert+ggx", channels=3, kd=np.array([0.1, 0.3, 0.6]), ks=np.array([1.0, 0.8, 0.5]), alpha=0.3, eta=1.5)
     found = fm.fit(seen(truth), "lambert+ggx")
     assert {e.name: e.size for e in found.entries} == {"kd": 3, "ks": 3, "alpha": 1, "eta": 1}
     assert found.result == "converged"
@@ -237,7 +241,13 @@ def test_inverse_information_is_the_inverse_or_huge() -> None:
     ("rows", "name", "options", "error", "message"),
     [
         (5, "lambert+ggx", {}, FitmatError, r"5 valid samples, but lambert\+ggx has 4 free parameters and needs at le"),
-        (1, "lambert", {}, FitmatError, r"1 valid samples, but lambert has 1 free parameters and needs at least 3; mea"),
+        (
+            1,
+            "lambert",
+            {},
+            FitmatError,
+            r"1 valid samples, but lambert has 1 free parameters and needs at least 3; mea",
+        ),
         (51, "lambert", {"fixed": {"ks": 1}}, ModelError, r"cannot fix 'ks': lambert has kd\."),
         (51, "lambert", {"fixed": {"kd": [1, 1]}}, ModelError, r"fixed kd has 2 values: expected 1 or 1\."),
         (51, "lambert", {"fixed": {"kd": 1.5}}, ModelError, r"parameter kd = 1\.5: expected a value from 0 to 1\."),

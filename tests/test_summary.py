@@ -1,6 +1,7 @@
 """Quantities for people: intervals on their natural scale, what follows from what, and why a number is missing."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ def fit() -> Fit:
     return fm.fit(m, "lambert+ggx")
 
 
-def draws(fit: Fit, name: str, values: dict[str, float]) -> Posterior:
+def draws(fit: Fit, name: str, values: dict[str, Any]) -> Posterior:
     """2000 log-normal draws, 10 % wide, of a model with these values, given in the order of its vector."""
     centre = np.array(list(values.values()))
     spread = np.exp(0.1 * np.random.default_rng(1).normal(size=(2000, len(centre))))
@@ -55,7 +56,9 @@ def test_laplace_intervals_are_taken_where_the_parameter_lives(fit: Fit) -> None
     """Linear for kd and ks; value·exp(± 1.96 sd/value) for alpha and eta, whose scale is logarithmic."""
     found, sd = named(parameters(fm.laplace(fit, seed=1))), np.sqrt(np.diagonal(fit.covariance))
     for k, name in enumerate(("kd", "ks")):
-        np.testing.assert_allclose(found[name].ci95[0], fit.values[k] + 1.959964 * sd[k] * np.array([-1, 1]), rtol=ROUNDING)
+        np.testing.assert_allclose(
+            found[name].ci95[0], fit.values[k] + 1.959964 * sd[k] * np.array([-1, 1]), rtol=ROUNDING
+        )
     for k, name in enumerate(("alpha", "eta"), start=2):
         factor = np.exp(1.959964 * sd[k] / fit.values[k])
         np.testing.assert_allclose(found[name].ci95[0], fit.values[k] * np.array([1 / factor, factor]), rtol=ROUNDING)
@@ -77,7 +80,7 @@ def test_sampled_intervals_are_quantiles(fit: Fit) -> None:
     found = parameters(posterior)
     for k, quantity in enumerate(found[:4]):
         np.testing.assert_array_equal(quantity.ci95[0], np.quantile(posterior.values[:, k], [0.025, 0.975]))
-        np.testing.assert_array_equal(quantity.sd, [posterior.values[:, k].std()])
+        np.testing.assert_allclose(quantity.sd, [posterior.values[:, k].std()])
 
 
 def test_unusable_chains_fall_back_on_laplace(fit: Fit) -> None:

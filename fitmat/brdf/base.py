@@ -62,11 +62,11 @@ def evaluate_pairs(model: AbstractBRDF, wi: Directions, wo: Directions) -> Sampl
 
 
 def padded_length(count: int) -> int:
-    """The array length to compile for: `count` rounded up by at most a quarter (at least 64).
+    """The array length to compile for: `count` rounded up by at most an eighth (at least 64).
 
-    JAX compiles a program for every array length; with four lengths an octave most files share theirs.
+    JAX compiles a program for every array length; with eight lengths an octave most files share theirs.
     """
-    step = 2 ** max(4, int(count - 1).bit_length() - 3) if count > 1 else 16
+    step = 2 ** max(4, int(count - 1).bit_length() - 4) if count > 1 else 16
     return max(64, -(-count // step) * step)
 
 

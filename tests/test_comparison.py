@@ -1,0 +1,236 @@
+"""The match: distances by hand and by brute force in numpy, the words of the verdict, the metrics of the literature."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+from oracles import ggx
+
+import fitmat as fm
+from fitmat.comparison import ALBEDO_ANGLES, Comparison, Estimate, compare, fit_metrics
+from fitmat.errors import FitmatError
+from fitmat.outcome import Fit
+from fitmat.posterior import Posterior
+
+EXACT = 1e-9
+"""Relative; where both models are constant the quadrature cancels."""
+
+CUBE = 1e-3
+"""Relative; 16 Gauss nodes in cosθ_i meet cos^(2/3), whose slope is infinite at grazing."""
+
+BRUTE = 5e-3
+"""Relative; midpoint rules of 90 × 90 × 90 here and the library's own rule, each within 2e-3 for these wide lobes."""
+
+GREY = {"empirical": {"kd": 0.25, "ks": 0.0, "exponent": 30.0}, "microfacet": {"kd": 0.2, "ks": 0.0, "alpha": 0.3}}
+"""Lobes of weight 0: only the diffuse parts differ, by a quarter of the microfacet model's."""
+
+
+@pytest.fixture(scope="module")
+def plastic() -> fm.Measurements:
+    truth, theta_o = fm.model("lambert+ggx", kd=0.3, alpha=0.3, eta=1.5), np.deg2rad(np.arange(-80, 81, 10))
+    return fm.simulate(truth, np.deg2rad([20, 45, 70]), theta_o, relative_noise=0.02, absolute_noise=1e-3, seed=1)
+
+
+@pytest.fixture(scope="module")
+def fits(plastic: fm.Measurements) -> tuple[Fit, Fit]:
+    return fm.fit(plastic, "lambert+blinn-phong"), fm.fit(plastic, "lambert+ggx")
+
+
+@pytest.fixture(scope="module")
+def match(fits: tuple[Fit, Fit]) -> Comparison:
+    return compare(*(fm.laplace(fit, seed=1) for fit in fits))
+
+
+def certain(fit: Fit, values: dict[str, Any]) -> Posterior:
+    """Two draws that both say this model."""
+    model = fm.model(fit.name, channels=1, **values)
+    other = dataclasses.replace(fit, model=model)
+    return Posterior(other, "laplace", np.tile(other.values, (2, 1)), np.zeros(2))
+
+
+def pair(fits: tuple[Fit, Fit], empirical: dict[str, Any], microfacet: dict[str, Any]) -> Comparison:
+    return compare(certain(fits[0], empirical), certain(fits[1], microfacet))
+
+
+def test_diffuse_surfaces_differ_as_computed_by_hand(fits: tuple[Fit, Fit]) -> None:
+    """|0.25 − 0.2|/0.2; in the cube root |∛(0.25/π) − ∛(0.2/π)| √(mean cos^(2/3)), the mean over solid angle 3/5."""
+    found = pair(fits, **GREY)
+    assert found.hemisphere_distance.value == pytest.approx(0.25, rel=EXACT)
+    assert found.measured_distance.value == pytest.approx(0.25, rel=EXACT)
+    by_hand = (np.cbrt(0.25 / np.pi) - np.cbrt(0.2 / np.pi)) * np.sqrt(0.6)
+    assert found.cube_root_distance.value == pytest.approx(by_hand, rel=CUBE)
+    assert found.albedo_gap_max.value == pytest.approx(0.05, rel=BRUTE)
+    assert found.albedo_gap_sign == 1
+    assert found.hemisphere_distance.ci95 == pytest.approx((0.25, 0.25))  # both draws say the same
+
+
+def test_exponents_beside_each_other(fits: tuple[Fit, Fit]) -> None:
+    found = pair(fits, GREY["empirical"], {"kd": 0.2, "ks": 0.0, "alpha": 0.1})
+    assert found.fitted_exponent is not None
+    assert found.implied_exponent is not None
+    assert found.fitted_exponent.value == pytest.approx(30.0)
+    assert found.implied_exponent.value == pytest.approx(198.0)  # 2/0.1² − 2
+
+
+def test_lobes_differ_as_by_brute_force(fits: tuple[Fit, Fit]) -> None:
+    """Both formulas again in numpy, on midpoint grids in θ_i, θ_o and φ."""
+    found = pair(fits, {"kd": 0.2, "ks": 0.05, "exponent": 10.0}, {"kd": 0.2, "ks": 1.0, "alpha": 0.4, "eta": 1.5})
+    count = 90
+    theta, phi = (np.arange(count) + 0.5) * np.pi / 2 / count, (np.arange(count) + 0.5) * np.pi / count
+    ti, to, azimuth = np.meshgrid(theta, theta, phi, indexing="ij")
+    wi, wo = ggx.hemisphere(ti, 0.0), ggx.hemisphere(to, azimuth)
+    h = wi + wo
+    cos = h[..., 2] / np.linalg.norm(h, axis=-1)
+    difference = 0.05 * 18 / (8 * np.pi) * cos**10 - ggx.brdf(wi, wo, 0.4, 1.5)
+    microfacet = 0.2 / np.pi + ggx.brdf(wi, wo, 0.4, 1.5)
+    solid = np.sin(ti) * np.sin(to)
+    weight = solid * np.cos(ti) * np.cos(to)
+    hemisphere = np.sqrt(np.sum(weight * difference**2) / np.sum(weight * microfacet**2))
+    roots = np.cbrt((microfacet + difference) * np.cos(ti)) - np.cbrt(microfacet * np.cos(ti))
+    assert found.hemisphere_distance.value == pytest.approx(hemisphere, rel=BRUTE)
+    assert found.cube_root_distance.value == pytest.approx(np.sqrt(np.sum(solid * roots**2) / solid.sum()), rel=BRUTE)
+    at_normal = ggx.albedo(0.0, 0.4, 1.5) + 0.2
+    assert found.albedo_microfacet[1, 0] == pytest.approx(at_normal, rel=BRUTE)
+    assert found.albedo_theta_i is ALBEDO_ANGLES
+    gap = found.albedo_empirical[1] - found.albedo_microfacet[1]
+    worst = np.argmax(np.abs(gap))
+    assert found.albedo_gap_theta_i_deg == pytest.approx(np.rad2deg(ALBEDO_ANGLES[worst]))
+    assert found.albedo_gap_sign == np.sign(gap[worst])
+    assert found.albedo_gap_max.value == pytest.approx(np.abs(gap[worst]))
+
+
+def test_only_the_measured_incidences_count_where_said(fits: tuple[Fit, Fit]) -> None:
+    """20°, 45° and 70° by brute force in θ_o and φ, each weighted by cosθ_i."""
+    found = pair(fits, {"kd": 0.2, "ks": 0.05, "exponent": 10.0}, {"kd": 0.2, "ks": 1.0, "alpha": 0.4, "eta": 1.5})
+    count = 400
+    theta, phi = (np.arange(count) + 0.5) * np.pi / 2 / count, (np.arange(count) + 0.5) * np.pi / count
+    to, azimuth = np.meshgrid(theta, phi, indexing="ij")
+    wo, sums = ggx.hemisphere(to, azimuth), np.zeros(2)
+    for angle in np.deg2rad([20, 45, 70]):
+        wi = np.broadcast_to(ggx.hemisphere(angle, 0.0), wo.shape)
+        h = wi + wo
+        lobe = ggx.brdf(wi, wo, 0.4, 1.5)
+        difference = 0.05 * 18 / (8 * np.pi) * (h[..., 2] / np.linalg.norm(h, axis=-1)) ** 10 - lobe
+        weight = np.cos(angle) * np.sin(to) * np.cos(to)
+        sums += np.sum(weight * difference**2), np.sum(weight * (0.2 / np.pi + lobe) ** 2)
+    assert found.measured_distance.value == pytest.approx(np.sqrt(sums[0] / sums[1]), rel=BRUTE)
+
+
+def test_the_order_of_arguments_does_not_matter(fits: tuple[Fit, Fit], match: Comparison) -> None:
+    other = compare(*(fm.laplace(fit, seed=1) for fit in reversed(fits)))
+    assert other.verdict == match.verdict
+    assert other.hemisphere_distance == match.hemisphere_distance
+    assert other.delta_bic == match.delta_bic
+
+
+def test_evidence_is_the_difference_of_criteria(fits: tuple[Fit, Fit], match: Comparison) -> None:
+    """The microfacet model has one parameter more: Schwarz's price is ln 51."""
+    gain = 2 * (fits[1].log_likelihood - fits[0].log_likelihood)
+    assert match.delta_bic == pytest.approx(gain - np.log(51))
+    assert match.delta_aicc == pytest.approx(fits[0].aicc - fits[1].aicc)
+    low, high = match.hemisphere_distance.ci95
+    assert low < match.hemisphere_distance.value < high
+    assert (match.albedo_empirical[0] <= match.albedo_empirical[2]).all()
+
+
+@pytest.mark.parametrize(
+    ("ci95", "words"),
+    [
+        ((0.04, 0.09), "blinn-phong and ggx hardly differ: 8 % apart over the hemisphere (95 % interval 4–9 %)."),
+        ((0.04, 0.25), "blinn-phong and ggx differ moderately: 8 % apart"),
+        ((0.04, 0.31), "blinn-phong and ggx differ strongly: 8 % apart"),
+    ],
+)
+def test_the_verdict_names_the_distance(match: Comparison, ci95: tuple[float, float], words: str) -> None:
+    assert dataclasses.replace(match, hemisphere_distance=Estimate(0.08, ci95)).verdict.startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("delta_bic", "words"),
+    [
+        (9.9, "The data do not decide between them (ΔBIC 10)."),
+        (-9.0, "The data do not decide between them (ΔBIC -9)."),
+        (12.0, "The data clearly prefer ggx (ΔBIC 12)."),
+        (-12.0, "The data clearly prefer blinn-phong (ΔBIC 12)."),
+    ],
+)
+def test_the_verdict_names_the_evidence(match: Comparison, delta_bic: float, words: str) -> None:
+    assert words in dataclasses.replace(match, delta_bic=delta_bic).verdict
+
+
+def test_the_verdict_names_the_gap_in_albedo(match: Comparison) -> None:
+    gap = {"albedo_gap_max": Estimate(0.123, (0.1, 0.15)), "albedo_gap_theta_i_deg": 75.0, "albedo_gap_sign": -1}
+    words = "At 75° incidence blinn-phong reflects 12.3 % of the light less than ggx (10.0–15.0 %)."
+    assert words in dataclasses.replace(match, **gap).verdict
+    assert words.replace("less", "more") in dataclasses.replace(match, **{**gap, "albedo_gap_sign": 1}).verdict
+
+
+def test_the_verdict_warns_of_impossible_albedos(match: Comparison) -> None:
+    bright = np.tile(np.linspace(1.2, 0.9, len(ALBEDO_ANGLES)), (3, 1))
+    verdict = dataclasses.replace(match, albedo_empirical=bright).verdict
+    assert "blinn-phong reflects more light than it receives (albedo 1.20 at 0°)." in verdict
+    assert "more light than it receives" not in match.verdict
+
+
+@pytest.mark.parametrize("result", ["max_steps", "nonfinite"])
+def test_the_verdict_warns_of_unfinished_fits(match: Comparison, result: str) -> None:
+    unfinished = dataclasses.replace(match.microfacet, fit=dataclasses.replace(match.microfacet.fit, result=result))
+    warning = f"Do not rely on this match: the fit of lambert+ggx ended {result}."
+    assert warning in dataclasses.replace(match, microfacet=unfinished).verdict
+    assert "Do not rely" not in match.verdict
+    assert match.microfacet.fit.adequacy in match.verdict
+
+
+def test_what_cannot_be_compared_is_refused(fits: tuple[Fit, Fit]) -> None:
+    blinn, facets = (fm.laplace(fit, seed=1) for fit in fits)
+    with pytest.raises(
+        FitmatError, match=r"one empirical .* and one microfacet model, got lambert\+ggx and lambert\+g"
+    ):
+        compare(facets, facets)
+    with pytest.raises(FitmatError, match=r"got lambert\+blinn-phong and lambert\+blinn-phong\."):
+        compare(blinn, blinn)
+    m = fits[0].measurements
+    elsewhere = dataclasses.replace(blinn, fit=dataclasses.replace(fits[0], measurements=m.rows(np.arange(51))))
+    with pytest.raises(FitmatError, match=r"compare needs two fits to the same Measurements object\."):
+        compare(elsewhere, facets)
+    broken = dataclasses.replace(blinn, fit=dataclasses.replace(fits[0], result="nonfinite", log_likelihood=np.nan))
+    with pytest.raises(
+        FitmatError, match=r"lambert\+blinn-phong: the fit ended nonfinite, there is nothing to compare"
+    ):
+        compare(broken, facets)
+
+
+def test_metrics_of_three_samples_by_hand(fits: tuple[Fit, Fit]) -> None:
+    """A Lambert surface of f = 0.1; the third sample lies beyond Ngan's 80°, and a fourth is masked."""
+    ti, to = np.deg2rad([30.0, 60.0, 30.0, 30.0]), np.deg2rad([0.0, 60.0, 85.0, 10.0])
+    measured = np.array([0.12, 0.3, 0.05, 9.0])
+    m = fm.from_arrays(ti, to, measured)
+    m = dataclasses.replace(m, valid=np.array([[True], [True], [True], [False]]))
+    fit = dataclasses.replace(fits[0], measurements=m, model=fm.model("lambert", kd=0.1 * np.pi))
+    found = fit_metrics(fit)
+    ci, co, y = np.cos(ti)[:3], np.cos(to)[:3], measured[:3]
+    assert found["cube_root"] == pytest.approx(np.sqrt(np.mean((np.cbrt(y * ci) - np.cbrt(0.1 * ci)) ** 2)))
+    logs = np.log((y * ci * co + 1e-3) / (0.1 * ci * co + 1e-3))
+    assert found["log_ratio"] == pytest.approx(np.sqrt(np.mean(logs**2)))
+    assert found["ngan"] == pytest.approx(np.sqrt(np.mean(((y - 0.1) * ci)[:2] ** 2)))
+    assert found["low_e2"] == pytest.approx(np.mean((np.log1p(y * ci) - np.log1p(0.1 * ci)) ** 2 * np.sin(ti[:3])))
+    assert found["peak_ratio"] == pytest.approx(np.median([0.1 / 0.12, 0.1 / 0.3]))
+    assert found["misfit_ratio"] == fits[0].misfit_ratio
+
+
+def test_metrics_without_a_basis_are_none(fits: tuple[Fit, Fit]) -> None:
+    """Nothing within 80°, no positive maximum, no known noise."""
+    m = fm.from_arrays(np.deg2rad([85.0]), np.deg2rad([10.0]), np.array([-0.1]))
+    unknown = dataclasses.replace(fits[0].noise, known=False)
+    found = fit_metrics(dataclasses.replace(fits[0], measurements=m, noise=unknown))
+    assert [key for key, value in found.items() if value is None] == ["ngan", "peak_ratio", "misfit_ratio"]
+
+
+def test_a_fit_has_the_peak_of_its_data(fits: tuple[Fit, Fit]) -> None:
+    """GGX fitted to GGX with 2 % noise."""
+    assert fit_metrics(fits[1])["peak_ratio"] == pytest.approx(1.0, abs=0.05)
+    spoilt = dataclasses.replace(fits[1], model=fm.model("lambert", kd=0.3))
+    ratio = fit_metrics(spoilt)["peak_ratio"]
+    assert ratio is not None
+    assert ratio < 0.9

@@ -1,0 +1,124 @@
+"""What a person at the terminal sees, and which option concerns which model."""
+
+import dataclasses
+import signal
+
+import numpy as np
+import pytest
+
+import fitmat
+from fitmat import console
+from fitmat.brdf import LOBES
+from fitmat.errors import ModelError
+from fitmat.posterior import Posterior
+from fitmat.synthetic import simulate
+
+
+@pytest.fixture(scope="module")
+def posterior() -> Posterior:
+    truth = fitmat.model("lambert+ggx", channels=3, kd=np.array([0.4, 0.1, 0.2]), alpha=0.3)
+    angles = np.deg2rad([20, 45, 70]), np.deg2rad(np.arange(-80, 81, 10))
+    made = simulate(truth, *angles, relative_noise=0.02, absolute_noise=1e-3, seed=1)
+    posteriors, match = console.study(made, ["lambert+ggx"], fixed={}, masking=None, sampling=False, seed=0)
+    assert match is None
+    return posteriors[0]
+
+
+@pytest.fixture(autouse=True)
+def narrow(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+
+
+def test_model_names_are_tidied():
+    assert console.model_names(" lambert + GGX,phong,,lambert+ggx") == ["lambert+ggx", "phong"]
+
+
+def test_no_model_name():
+    with pytest.raises(ModelError, match="no model given; try --models lambert"):
+        console.model_names(" , ")
+
+
+def test_show_fits_80_columns(posterior, capsys, tmp_path):
+    console.show([posterior], None, tmp_path)
+    out = capsys.readouterr().out
+    lines = out.splitlines()
+    assert max(map(len, (line for line in lines if str(tmp_path) not in line))) <= 80
+    assert "…" not in out
+    assert lines[-1] == f"Report: {tmp_path / 'report.html'}"
+    assert "lambert+ggx: converged, " in out
+    for name in ("kd r", "kd g", "ks b", "alpha", "eta", "discrepancy", "→ f0", "→ roughness"):
+        assert any(line.startswith(name) for line in lines)
+
+
+def test_show_names_the_outcome(posterior, capsys, tmp_path):
+    fit = dataclasses.replace(posterior.fit, result="unidentifiable", undetermined=("eta",))
+    console.show([dataclasses.replace(posterior, fit=fit, interrupted=True)], None, tmp_path)
+    out = capsys.readouterr().out
+    assert "unidentifiable: At least one parameter is not determined" in out
+    assert "interrupted: sampling was stopped" in out
+    assert any(line.startswith("eta") and line.rstrip().endswith("not determined") for line in out.splitlines())
+
+
+def test_brackets_in_names_are_text(posterior, capsys, tmp_path):
+    measurements = dataclasses.replace(posterior.fit.measurements, source="[red]x.csv", channels=("[bold]", "g", "b"))
+    fit = dataclasses.replace(posterior.fit, measurements=measurements)
+    console.show([dataclasses.replace(posterior, fit=fit)], None, tmp_path / "[dim]")
+    out = capsys.readouterr().out
+    assert all(text in out for text in ("[red]x.csv", "kd [bold]", "[dim]/report.html"))
+
+
+def test_every_lobe_is_listed_once_with_what_sets_it_apart(capsys):
+    console.list_models()
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines[1:] if line[:1].strip() and line.split()[0] in LOBES] == list(LOBES)
+    assert "ggx with another Fresnel" in " ".join(" ".join(lines).split())
+
+
+@pytest.mark.parametrize("name", LOBES)
+def test_manual_states_every_parameter(name, capsys):
+    console.manual(name)
+    out = capsys.readouterr().out
+    assert max(map(len, out.splitlines())) <= 80
+    for key, (p, default) in LOBES[name].defaults().items():
+        row = [line for line in out.splitlines() if line.startswith(f"{key} ")][-1]
+        assert p.symbol in row
+        assert f"{default:g}" in row
+    assert "Reference" in out
+    assert "Limits" in out
+
+
+def test_options_go_to_the_models_that_have_them(posterior):
+    fixed = {"exponent": np.array([20.0]), "kd": np.array([0.3])}
+    names = ["lambert+phong", "lambert+ggx"]
+    measurements = posterior.fit.measurements
+    posteriors, match = console.study(measurements, names, fixed=fixed, masking="separable", sampling=False, seed=0)
+    assert [sorted(p.fit.held) for p in posteriors] == [["exponent", "kd"], ["kd"]]
+    assert match is not None
+
+
+@pytest.mark.parametrize(
+    ("fixed", "masking", "sentence"),
+    [
+        ({"zz": np.array([1.0])}, None, r"--fix zz: no model of lambert has it; they have kd\."),
+        ({}, "separable", "--masking separable: none of lambert has a masking to choose"),
+    ],
+)
+def test_options_that_concern_no_model(posterior, fixed, masking, sentence):
+    measurements = posterior.fit.measurements
+    with pytest.raises(ModelError, match=sentence):
+        console.study(measurements, ["lambert"], fixed=fixed, masking=masking, sampling=False, seed=0)
+
+
+def test_handler_is_restored_after_sampling(posterior, monkeypatch):
+    before = signal.getsignal(signal.SIGINT)
+    seen = []
+
+    def sample(found, *, seed, progress):
+        seen.append(signal.getsignal(signal.SIGINT))
+        progress(1, 2)
+        return posterior
+
+    monkeypatch.setattr(console, "sample", sample)
+    console.study(posterior.fit.measurements, ["lambert+ggx"], fixed={}, masking=None, sampling=True, seed=0)
+    assert seen[0] is not before
+    assert signal.getsignal(signal.SIGINT) is before

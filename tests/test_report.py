@@ -1,0 +1,235 @@
+"""The page and the JSON object of a run: complete, strict, self-contained, and safe whatever the names are."""
+
+import base64
+import dataclasses
+import html.parser
+import json
+import math
+import re
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fitmat
+from fitmat import console, report
+from fitmat.comparison import Comparison
+from fitmat.display import interval, with_error
+from fitmat.measurement import Measurements
+from fitmat.posterior import Posterior
+from fitmat.synthetic import simulate
+
+Study = tuple[list[Posterior], Comparison | None]
+NAMES = ["lambert+blinn-phong", "lambert+ggx"]
+
+
+def paint() -> Measurements:
+    """Three channels, three incidences, 51 directions."""
+    truth = fitmat.model("lambert+ggx", channels=3, kd=np.array([0.4, 0.1, 0.2]), alpha=0.3)
+    angles = np.deg2rad([20, 45, 70]), np.deg2rad(np.arange(-80, 81, 10))
+    made = simulate(truth, *angles, relative_noise=0.02, absolute_noise=1e-3, seed=1)
+    return dataclasses.replace(made, source="paint.csv")
+
+
+@pytest.fixture(scope="module")
+def studied() -> Study:
+    return console.study(paint(), NAMES, fixed={}, masking=None, sampling=False, seed=0)
+
+
+@pytest.fixture(scope="module")
+def page(studied: Study) -> str:
+    return report.to_html(*studied)
+
+
+class Page(html.parser.HTMLParser):
+    """Tags that are open, every attribute that links somewhere, and the text."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.links: list[str] = []
+        self.words: list[str] = []
+        self.tags: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Remember the tag and where it links."""
+        self.tags.append(tag)
+        if tag not in ("meta", "img"):
+            self.open.append(tag)
+        self.links += [value or "" for name, value in attrs if name in ("src", "href", "action")]
+
+    def handle_endtag(self, tag: str) -> None:
+        """Close the innermost tag, which must be this one."""
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        """Remember the text."""
+        self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        """All text, single-spaced."""
+        return " ".join(" ".join(self.words).split())
+
+
+def test_page_is_well_formed_and_says_what_was_found(page, studied):
+    posteriors, match = studied
+    read = Page(page)
+    assert read.open == []
+    assert match is not None
+    assert match.verdict in read.text
+    for words in (
+        *NAMES,
+        "51 samples, channels r, g, b",
+        "kd g",
+        "→ f0",
+        "95 % interval",
+        f"{posteriors[1].fit.bic:.1f}",
+    ):
+        assert words in read.text
+    assert "nan" not in read.text.lower().replace("illuminan", "")
+
+
+def test_pictures_are_embedded_and_whole(page):
+    """Curves and residuals of the channels, albedo, two corner plots."""
+    links = Page(page).links
+    assert len(links) == 3 + 1 + 1 + 2
+    for link in links:
+        kind, _, data = link.partition(",")
+        assert kind == "data:image/png;base64"
+        image = base64.b64decode(data, validate=True)
+        width, height = struct.unpack(">II", image[16:24])
+        assert image.startswith(b"\x89PNG\r\n\x1a\n")
+        assert image.endswith(b"IEND\xaeB`\x82")
+        assert 200 < width < 2000
+        assert 200 < height < 2000
+
+
+def test_nothing_is_fetched(page):
+    assert not re.search(r"https?://|//[a-z]|@import|url\(", re.sub(r"base64,[^\"]*", "", page))
+
+
+def test_names_are_escaped(studied):
+    """A file and a channel may be called anything."""
+    evil = "<script>alert(1)</script>"
+    posterior = studied[0][0]
+    measurements = dataclasses.replace(
+        posterior.fit.measurements, source=evil, channels=(evil, "g", "b"), notes=(evil,), masked={evil: 1}
+    )
+    fit = dataclasses.replace(posterior.fit, measurements=measurements)
+    found = Page(report.to_html([dataclasses.replace(posterior, fit=fit)], None))
+    assert "script" not in found.tags
+    assert found.text.count(evil) >= 4
+
+
+def test_outcomes_are_labelled(studied):
+    posterior = studied[0][1]
+    odd = dataclasses.replace(posterior.fit, result="unidentifiable", undetermined=("eta", "ks"))
+    text = Page(report.to_html([dataclasses.replace(posterior, fit=odd, interrupted=True)], None)).text
+    assert "lambert+ggx: unidentifiable. At least one parameter is not determined by these angles: fix it" in text
+    assert "Not determined: ks, eta." in text or "Not determined: eta, ks." in text
+    assert "sampling was interrupted; what was done is kept" in text
+
+
+def test_json_has_the_agreed_keys(studied):
+    found = json.loads(json.dumps(report.to_dict(*studied), allow_nan=False))
+    assert {"file", "n_samples", "n_masked", "channels", "fits", "match"} <= set(found)
+    assert (found["file"], found["n_samples"], found["n_masked"]) == ("paint.csv", 51, 0)
+    assert found["channels"] == ["r", "g", "b"]
+    for fit, name in zip(found["fits"], NAMES, strict=True):
+        assert fit["model"] == name
+        assert fit["result"] == "converged"
+        assert 1 <= fit["n_starts_agreeing"] <= fit["n_starts"]
+        assert {"verdict", "ess_min", "rhat_max", "tau_max"} <= set(fit["posterior"])
+        assert {"metrics", "aicc", "bic"} <= set(fit)
+        for quantity in (*fit["parameters"].values(), *fit["derived"].values()):
+            assert {"value", "sd", "ci95", "unit", "symbol"} <= set(quantity)
+    match = found["match"]
+    assert (match["empirical"], match["microfacet"]) == tuple(NAMES)
+    for key in ("hemisphere_distance", "cube_root_distance", "albedo_gap_max", "implied_exponent"):
+        assert match[key]["ci95"][0] <= match[key]["ci95"][1]
+        assert math.isfinite(match[key]["value"])
+    assert 0 <= match["albedo_gap_max"]["theta_i_deg"] <= 85
+    assert match["verdict"] == studied[1].verdict
+
+
+def test_json_lists_channels_and_not_what_they_share(studied):
+    parameters = report.to_dict(*studied)["fits"][1]["parameters"]
+    assert np.shape(parameters["kd"]["value"]) == np.shape(parameters["kd"]["sd"]) == (3,)
+    assert np.shape(parameters["kd"]["ci95"]) == (3, 2)
+    # 51 samples of 2 % in each channel give kd to about 1 %: five standard deviations.
+    assert parameters["kd"]["value"] == pytest.approx([0.4, 0.1, 0.2], rel=0.05)
+    assert isinstance(parameters["alpha"]["value"], float)
+    assert np.shape(parameters["alpha"]["ci95"]) == (2,)
+
+
+def test_json_has_null_for_what_is_not_finite(studied):
+    posterior = studied[0][0]
+    fit = dataclasses.replace(posterior.fit, log_likelihood=math.nan, covariance=posterior.fit.covariance * math.inf)
+    found: dict[str, Any] = report.to_dict([dataclasses.replace(posterior, fit=fit)], None)
+    text = json.dumps(found, allow_nan=False)
+    assert json.loads(text)["fits"][0]["bic"] is None
+    assert found["match"] is None
+
+
+def test_write_makes_every_file(studied, tmp_path):
+    import xarray
+
+    report.write(tmp_path, *studied)
+    names = ["fit.json", *(f"posterior-{name}.nc" for name in NAMES), "report.html"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == names
+    draws = xarray.open_datatree(tmp_path / names[2], engine="h5netcdf")["posterior"]
+    assert draws["kd"].shape == (1, len(studied[0][1].values), 3)
+    assert np.mean(draws["alpha"].values) == pytest.approx(studied[0][1].values[:, -2].mean())
+
+
+@pytest.mark.parametrize(
+    ("value", "sd", "text"),
+    [
+        (0.15032, 0.00101, "0.1503 ± 0.0010"),
+        (117.3, 25.2, "117 ± 25"),
+        (0.03, 0.25, "0.03 ± 0.25"),
+        (1.5, math.nan, "1.5"),
+        (0.0, 0.1, "0"),
+        (2e-7, 3.0, "2e-07"),
+        (3.4e66, 2.9e65, "3.4e+66 ± 2.9e+65"),
+        (0.40637857925358, 1e-13, "0.4064"),
+        (math.nan, 1.0, "–"),
+    ],
+)
+def test_values_show_two_digits_of_their_error(value, sd, text):
+    assert with_error(value, sd) == text
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "sd", "text"),
+    [
+        (0.98251, 1.01001, 0.007, "0.9825 – 1.0100"),
+        (0, 7.7e-5, 2e-5, "0 – 0.000077"),
+        (0.006858, 0.9166, math.nan, "0.00686 – 0.917"),
+        (1.2, 1.4e8, 3e7, "1.2 – 1.4e+08"),
+    ],
+)
+def test_intervals_have_the_digits_of_their_value(low, high, sd, text):
+    assert interval(low, high, sd) == text
+
+
+def test_what_is_not_determined_shows_no_error(studied):
+    posterior = studied[0][1]
+    fit = dataclasses.replace(posterior.fit, result="unidentifiable", undetermined=("eta",))
+    found = {row["name"]: row for row in report.rows(dataclasses.replace(posterior, fit=fit))}
+    for name in ("eta", "f0"):
+        assert found[name]["remark"] == "not determined by these angles"
+        assert "±" not in found[name]["value"]
+        assert "–" in found[name]["interval"]
+    assert "±" in found["alpha"]["value"]
+
+
+def test_template_has_no_arithmetic():
+    """A report formats; what it shows is computed elsewhere."""
+    text = (Path(report.__file__).parent / "templates" / "report.html").read_text()
+    for expression in re.findall(r"{{(.*?)}}", text):
+        assert not re.search(r"[^\w\"'.]\s*[*/]\s|\*\*", expression), expression
