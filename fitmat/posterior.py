@@ -96,7 +96,7 @@ class Posterior:
         return [
             (
                 f"{e.name} {channels[k]}" if e.shape and len(channels) > 1 else e.name,
-                with_error(self.fit.values[e.place.start + k], sd[e.place.start + k]),
+                with_error(float(self.fit.values[e.place.start + k]), float(sd[e.place.start + k])),
                 " – ".join(f"{limit:.4g}" for limit in interval[e.place.start + k]),
             )
             for e in self.fit.entries

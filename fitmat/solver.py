@@ -12,8 +12,8 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Float, Int
 
-RTOL = 1e-10
-"""Relative tolerance of the steps, in units of each parameter's own scale."""
+RTOL = 1e-8
+"""Relative tolerance of the steps in units of each parameter's own scale, SciPy's default; convergence is quadratic."""
 
 FIRST_DAMPING = 1e-3
 """The first λ relative to the diagonal of JᵀJ: starts from a grid are close, and a bad step is taken back."""

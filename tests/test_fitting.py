@@ -92,7 +92,9 @@ def test_a_model_may_be_fixed_altogether(plastic: fm.Measurements) -> None:
 
 
 def test_colours_have_their_own_weights_and_share_their_shape() -> None:
-    truth = fm.model("lambert+ggx", channels=3, kd=np.array([0.1, 0.3, 0.6]), ks=np.array([1.0, 0.8, 0.5]), alpha=0.3, eta=1.5)
+    truth = fm.model(
+        "lambert+ggx", channels=3, kd=np.array([0.1, 0.3, 0.6]), ks=np.array([1.0, 0.8, 0.5]), alpha=0.3, eta=1.5
+    )
     found = fm.fit(seen(truth), "lambert+ggx")
     assert {e.name: e.size for e in found.entries} == {"kd": 3, "ks": 3, "alpha": 1, "eta": 1}
     assert found.result == "converged"

@@ -238,7 +238,9 @@ def test_draws_are_saved_as_arviz_reads_them(fit: Fit, sampled: Posterior, tmp_p
             assert group["alpha"].dims == ("chain", "draw")
             chains = group["alpha"].transpose("draw", "chain").values
             np.testing.assert_array_equal(chains.ravel(), posterior.values[:, 2])
-            np.testing.assert_array_equal(group["discrepancy"].transpose("draw", "chain").values.ravel(), posterior.discrepancy)
+            np.testing.assert_array_equal(
+                group["discrepancy"].transpose("draw", "chain").values.ravel(), posterior.discrepancy
+            )
             assert group.attrs["model"] == "lambert+ggx"
             assert group.attrs["verdict"] == posterior.verdict
     assert group["alpha"].shape == (1, 2000)
@@ -257,7 +259,7 @@ def test_intervals_cover_the_truth() -> None:
     """emcee's 95 % intervals of all four parameters, over files that differ by their noise alone."""
     truth, covered = np.array(list(TRUTH.values())), np.zeros(4)
     for seed in range(REPEATS):
-        low, high = fm.sample(fm.fit(seen(1000 + seed), "lambert+ggx"), seed=seed, max_steps=300).interval().T
+        low, high = fm.sample(fm.fit(seen(1000 + seed), "lambert+ggx"), seed=seed, max_steps=200).interval().T
         covered += (low <= truth) & (truth <= high)
     print("\ncovered:", dict(zip(TRUTH, covered / REPEATS, strict=True)))
     assert covered.min() / REPEATS >= AT_LEAST
