@@ -1,7 +1,7 @@
-"""The peer: Lambert + GGX, the likelihood and its coordinates in plain numpy, as a careful user would write them.
+"""The peer: Lambert + GGX, the likelihood and its coordinates in plain vectorised numpy, as a careful user would write them.
 
-What does not depend on the parameters (half vectors, cosines) is computed once, never in the loop. Uses no JAX and
-nothing of fitmat but the numbers of the data.
+The model is a function of two directions, as fitmat's is; with `hoisted`, what no parameter changes (half vectors,
+cosines) is taken out of the loop by hand. Uses no JAX and nothing of fitmat but the numbers of the data.
 """
 
 import numpy as np
@@ -33,9 +33,21 @@ class Problem:
         wo: Unit vectors to the sensor, (n, 3).
         value: Measured BRDF in sr⁻¹, (n,).
         sigma: Its standard deviation, (n,).
+        hoisted: Compute half vectors and cosines once, not with every evaluation of the model.
     """
 
-    def __init__(self, wi: np.ndarray, wo: np.ndarray, value: np.ndarray, sigma: np.ndarray) -> None:
+    def __init__(
+        self, wi: np.ndarray, wo: np.ndarray, value: np.ndarray, sigma: np.ndarray, *, hoisted: bool = True
+    ) -> None:
+        self.directions, self.hoisted = (wi, wo), hoisted
+        self.geometry()
+        self.x, self.noise = value * self.ci, sigma * self.ci
+        self.root2 = np.cbrt(self.x) ** 2
+        self.constant = -np.sum(0.5 * np.log(2 * np.pi) - np.log(self.ci))
+
+    def geometry(self) -> None:
+        """Half vectors and cosines of all pairs."""
+        wi, wo = self.directions
         h = wi + wo
         h = h / np.linalg.norm(h, axis=1, keepdims=True)
         self.ci, self.co = wi[:, 2].copy(), wo[:, 2].copy()
@@ -43,12 +55,11 @@ class Problem:
         self.si2, self.so2, self.sh2 = 1.0 - self.ci2, 1.0 - self.co2, h[:, 0] ** 2 + h[:, 1] ** 2
         self.cd = np.sum(wi * h, axis=1)
         self.cd2, self.cico = self.cd**2, self.ci * self.co
-        self.x, self.noise = value * self.ci, sigma * self.ci
-        self.root2 = np.cbrt(self.x) ** 2
-        self.constant = -np.sum(0.5 * np.log(2 * np.pi) - np.log(self.ci))
 
     def predicted(self, p: np.ndarray) -> np.ndarray:
         """f cosθ_i for kd, ks, alpha, eta: (4,) → (n,), (w, 4) → (w, n)."""
+        if not self.hoisted:
+            self.geometry()
         kd, ks, alpha, eta = p if p.ndim == 1 else p.T[:, :, None]
         alpha2, c = alpha**2, self.cd
         g = np.sqrt(eta**2 - 1.0 + self.cd2)

