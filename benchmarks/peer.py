@@ -1,4 +1,4 @@
-"""The peer: Lambert + GGX, the likelihood and its coordinates in plain vectorised numpy, as a careful user would write them.
+"""The peer: Lambert + GGX, the likelihood and its coordinates in plain vectorised numpy, as careful users write them.
 
 The model is a function of two directions, as fitmat's is; with `hoisted`, what no parameter changes (half vectors,
 cosines) is taken out of the loop by hand. Uses no JAX and nothing of fitmat but the numbers of the data.

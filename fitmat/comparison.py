@@ -117,6 +117,10 @@ class Comparison:
                 sentences.append(
                     f"{name} reflects more light than it receives (albedo {albedo.max():.2f} at {at:.0f}°)."
                 )
+        for fit in (self.empirical.fit, self.microfacet.fit):
+            if fit.undetermined:
+                loose = " and ".join(fit.undetermined)
+                sentences.append(f"{fit.name} leaves {loose} undetermined: trust the intervals, not the values.")
         unsure = [p.fit for p in (self.empirical, self.microfacet) if p.fit.result in ("max_steps", "nonfinite")]
         sentences += [f"Do not rely on this match: the fit of {f.name} ended {f.result}." for f in unsure]
         return " ".join(sentences)

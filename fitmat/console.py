@@ -20,7 +20,7 @@ from rich.text import Text
 from fitmat.brdf import LOBES, lobe_names, model
 from fitmat.comparison import Comparison, compare, is_empirical, is_microfacet
 from fitmat.errors import ModelError
-from fitmat.fitting import fit
+from fitmat.fitting import fit_each
 from fitmat.measurement import Measurements
 from fitmat.outcome import RESULTS
 from fitmat.params import entries
@@ -55,13 +55,14 @@ def study(
     screen = Console(stderr=True)
     parts = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*parts, console=screen, transient=True, disable=not screen.is_terminal) as bar:
-        for name in names:
-            task = bar.add_task(f"fitting {name}", total=None)
-            found = fit(measurements, name, **_options(name, names, fixed, masking))
+        fitting = bar.add_task(f"fitting {', '.join(names)}", total=None)
+        fits = fit_each(measurements, {name: _options(name, names, fixed, masking) for name in names})
+        bar.update(fitting, total=1, completed=1)
+        for found in fits:
             if not (sampling and found.finite):
                 posteriors.append(laplace(found, seed=seed))
                 continue
-            bar.update(task, description=f"sampling {name}")
+            task = bar.add_task(f"sampling {found.name}", total=None)
             with _interrupt_later() as asked:
 
                 def progress(done: int, total: int, task: TaskID = task, asked: list[int] = asked) -> None:

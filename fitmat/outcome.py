@@ -128,7 +128,7 @@ class Fit:
             for e in self.entries
             for k in range(e.size)
         ]
-        return [(name, symbol, with_error(self.values[at], sd[at])) for name, symbol, at in named]
+        return [(name, symbol, with_error(float(self.values[at]), float(sd[at]))) for name, symbol, at in named]
 
     def __str__(self) -> str:
         """The outcome and every parameter with its standard deviation."""

@@ -6,17 +6,15 @@ Computes nothing that another room could; the only importer of matplotlib.
 from collections.abc import Sequence
 
 import corner
-import jax.numpy as jnp
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fitmat.comparison import Comparison
 from fitmat.geometry import signed_zenith
-from fitmat.likelihood import residuals
 from fitmat.outcome import Fit
 from fitmat.posterior import Posterior
-from fitmat.prediction import Section, curve, predictive_band
+from fitmat.prediction import Section, curve, predictive_band, standardised_residuals
 
 # Okabe & Ito's palette, safe for colour-blind readers.
 BLACK, ORANGE, BLUE, GREEN, PURPLE = "#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7"
@@ -81,7 +79,7 @@ def _set_scale(ax: Axes, measured: np.ndarray, top: float) -> None:
 def plot_residuals(fit: Fit, *, channel: int = 0, ax: Axes | None = None) -> Axes:
     """Standardised residuals of one channel against theta_o, one colour per incidence angle."""
     ax = ax or new_axes()
-    z = np.asarray(residuals(fit.model, fit.data, jnp.asarray(fit.discrepancy)))[:, channel]
+    z = standardised_residuals(fit)[:, channel]
     used = np.asarray(fit.data.weight)[:, channel] > 0
     wi, wo = np.asarray(fit.data.wi), np.asarray(fit.data.wo)
     theta_i = np.rad2deg(np.arccos(np.clip(wi[:, 2], -1, 1)))

@@ -14,7 +14,7 @@ from scipy.special import ndtri
 
 from fitmat.brdf import AbstractBRDF, evaluate, evaluate_pairs
 from fitmat.geometry import from_angles
-from fitmat.likelihood import Data, from_stabilised, prepare, stabilised
+from fitmat.likelihood import Data, from_stabilised, prepare, residuals, stabilised
 from fitmat.measurement import Measurements
 from fitmat.outcome import Fit
 from fitmat.params import with_vector
@@ -58,6 +58,14 @@ def curve(fit: Fit, theta_i: float, theta_o: Float[np.ndarray, " k"]) -> Float[n
     wi = from_angles(np.full_like(theta_o, theta_i), np.zeros_like(theta_o))
     wo = from_angles(np.abs(theta_o), np.where(theta_o >= 0, np.pi, 0.0))
     return evaluate(fit.model, wi, wo)
+
+
+def standardised_residuals(fit: Fit) -> Float[np.ndarray, "n c"]:
+    """What the best fit leaves over, in standard deviations of noise and discrepancy; rows as in `fit.data`."""
+    return np.asarray(_residuals(fit.model, fit.data, jnp.asarray(fit.discrepancy)))
+
+
+_residuals = eqx.filter_jit(residuals)
 
 
 def predictive_band(posterior: Posterior, rows: np.ndarray) -> Float[np.ndarray, "2 k c"]:

@@ -73,8 +73,8 @@ class LevenbergMarquardt(optx.AbstractGaussNewton):
     rtol: float
     atol: float
     norm: Callable[[Any], Any] = optx.max_norm
-    descent: optx.DampedNewtonDescent = eqx.field(default_factory=optx.DampedNewtonDescent)
-    search: TrustRegion = eqx.field(default_factory=TrustRegion)
+    descent: optx.AbstractDescent = eqx.field(default_factory=optx.DampedNewtonDescent)
+    search: optx.AbstractSearch = eqx.field(default_factory=TrustRegion)
     verbose: Callable[..., None] = eqx.field(static=True, default=lambda **_: None)
 
 
