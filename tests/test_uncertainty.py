@@ -26,7 +26,7 @@ GAUSSIAN = 0.06
 """Relative: three errors, 1/√(2·1200), of a standard deviation from 1200 effective draws."""
 
 REPEATS, AT_LEAST = 100, 0.88
-"""95 % intervals of a correct program cover fewer than 88 of 100 truths for one choice of seeds in 250."""
+"""95 % intervals of a correct program cover fewer than 88 of 100 truths for one choice of seeds in 700."""
 
 TRUTH: dict[str, Any] = {"kd": 0.3, "ks": 1.0, "alpha": 0.3, "eta": 1.5}
 
