@@ -11,11 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.brdf import AbstractBRDF, evaluate
-from fitmat.energy import directional_albedo, incidence, incidence_rule, lobe_rule
+from fitmat.brdf import AbstractBRDF
+from fitmat.energy import incidence, incidence_rule, lobe_rule
 from fitmat.errors import FitmatError
 from fitmat.measurement import Measurements
-from fitmat.outcome import Fit
 from fitmat.params import with_vector
 from fitmat.posterior import Posterior
 
@@ -232,71 +231,30 @@ def _distances(
 ) -> tuple[Array, Array, Array, Array, Array]:
     """Hemisphere, measured and cube-root distance (d,), and channel-mean albedos (d, k), of d pairs of draws."""
     theta, weight = (jnp.asarray(part) for part in incidence_rule())
+    nodes = jnp.concatenate([theta, angles, jnp.asarray(ALBEDO_ANGLES)])
+    hemisphere, measured = slice(0, len(theta)), slice(len(theta), len(theta) + len(angles))
+    albedo = slice(len(theta) + len(angles), None)
 
-    def at(theta_i: Array, p: AbstractBRDF, m: AbstractBRDF) -> tuple[Array, Array, Array, Array]:
+    def at(theta_i: Array, p: AbstractBRDF, m: AbstractBRDF) -> tuple[Array, ...]:
+        """Integrals over ω_o: squared difference, square, squared root difference, solid angle, both albedos."""
         wi, rule = incidence(theta_i), lobe_rule(theta_i, jnp.minimum(p.width(), m.width()))
         f_p, f_m = (jax.vmap(lambda wo, f=f: jnp.atleast_1d(f(wi, wo)))(rule.wo) for f in (p, m))
         solid = jnp.where(rule.weight > 0, rule.weight / jnp.maximum(rule.wo[:, 2], 1e-12), 0.0)
         roots = (jnp.cbrt(f_p * wi[2]) - jnp.cbrt(f_m * wi[2])) ** 2
-        squares = rule.weight @ (f_p - f_m) ** 2, rule.weight @ f_m**2
-        return squares[0].mean(), squares[1].mean(), (solid @ roots).mean(), jnp.sum(solid)
+        sums = rule.weight @ (f_p - f_m) ** 2, rule.weight @ f_m**2, solid @ roots, rule.weight @ f_p, rule.weight @ f_m
+        difference, square, root, one, other = (part.mean() for part in sums)
+        return difference, square, root, jnp.sum(solid), one, other
 
     def pair(both: tuple[Array, Array]) -> tuple[Array, Array, Array, Array, Array]:
         p, m = with_vector(empirical, both[0]), with_vector(microfacet, both[1])
-        nodes = jnp.concatenate([theta, angles])
-        difference, reference, roots, solid = jax.vmap(lambda t: at(t, p, m))(nodes)
-        count, flat = len(theta), weight / jnp.cos(theta)
-        hemisphere = jnp.sqrt((weight @ difference[:count]) / (weight @ reference[:count]))
-        cosines = jnp.cos(angles)
-        measured = jnp.sqrt((cosines @ difference[count:]) / (cosines @ reference[count:]))
-        cube = jnp.sqrt((flat @ roots[:count]) / (flat @ solid[:count]))
-        albedos = [directional_albedo(f, jnp.asarray(ALBEDO_ANGLES)).mean(axis=1) for f in (p, m)]
-        return hemisphere, measured, cube, albedos[0], albedos[1]
+        difference, square, roots, solid, one, other = jax.vmap(lambda t: at(t, p, m))(nodes)
+        flat, cosines = weight / jnp.cos(theta), jnp.cos(angles)
+        return (
+            jnp.sqrt((weight @ difference[hemisphere]) / (weight @ square[hemisphere])),
+            jnp.sqrt((cosines @ difference[measured]) / (cosines @ square[measured])),
+            jnp.sqrt((flat @ roots[hemisphere]) / (flat @ solid[hemisphere])),
+            one[albedo],
+            other[albedo],
+        )
 
     return jax.lax.map(pair, values)
-
-
-def fit_metrics(fit: Fit) -> dict[str, float | None]:
-    """How far a fitted model is from its measurements, by the metrics of the literature.
-
-    Returns:
-        cube_root: √(mean (∛(M κ) − ∛(f κ))²), κ = cosθ_i; log_ratio: rms of ln((M κ + ε)/(f κ + ε)), κ = cosθ_i cosθ_o,
-        ε = 10⁻³; ngan: √(mean (M − f)² κ²) up to 80° (Ngan et al. 2005); low_e2: mean of
-        (ln(1 + M κ) − ln(1 + f κ))² sinθ_i (Löw et al. 2012, E2); peak_ratio: fitted over measured maximum, median over
-        incidences and channels; misfit_ratio: discrepancy over noise.
-    """
-    m = fit.measurements
-    predicted = evaluate(fit.model, m.wi, m.wo)
-    ci, co, valid = m.wi[:, 2:3], m.wo[:, 2:3], m.valid
-    measured = np.where(valid, m.value, 0.0)
-
-    def mean(term: np.ndarray, keep: np.ndarray | bool = True) -> float | None:
-        used = term[valid & keep]
-        return float(used.mean()) if used.size else None
-
-    def root(value: float | None) -> float | None:
-        return None if value is None else value**0.5
-
-    cubes = (np.cbrt(measured * ci) - np.cbrt(predicted * ci)) ** 2
-    kappa = np.maximum(ci * co, 1e-3)
-    logs = np.log(np.maximum(measured * kappa, 0) + 1e-3) - np.log(predicted * kappa + 1e-3)
-    high = (np.maximum(m.theta_i, m.theta_o) <= np.deg2rad(80.0))[:, None]
-    low = (np.log1p(np.maximum(measured * ci, 0)) - np.log1p(predicted * ci)) ** 2
-    return {
-        "cube_root": root(mean(cubes)),
-        "log_ratio": root(mean(logs**2)),
-        "ngan": root(mean(((measured - predicted) * ci) ** 2, high)),
-        "low_e2": mean(low * np.sin(m.theta_i)[:, None]),
-        "peak_ratio": _peak_ratio(m, predicted),
-        "misfit_ratio": fit.misfit_ratio if fit.noise.known else None,
-    }
-
-
-def _peak_ratio(m: Measurements, predicted: np.ndarray) -> float | None:
-    """Fitted over measured maximum, median over incidence angles and channels."""
-    groups = np.unique(np.round(np.rad2deg(m.theta_i), 2), return_inverse=True)[1]
-    peaks = [np.full((groups.max() + 1, m.value.shape[1]), -np.inf) for _ in range(2)]
-    for peak, f in zip(peaks, (m.value, predicted), strict=True):
-        np.maximum.at(peak, groups, np.where(m.valid, f, -np.inf))
-    usable = np.isfinite(peaks[0]) & (peaks[0] > 0)
-    return float(np.median(peaks[1][usable] / peaks[0][usable])) if usable.any() else None

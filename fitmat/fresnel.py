@@ -4,13 +4,18 @@ Each is a small module with its own parameters, so that any microfacet model can
 """
 
 from abc import abstractmethod
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
 
 from fitmat._types import Scalar, Spectrum
 from fitmat.params import param
+
+Numbers = TypeVar("Numbers", Array, np.ndarray)
+"""JAX or NumPy arrays; what goes in comes out."""
 
 _TINY = 1e-300
 
@@ -124,12 +129,12 @@ def schlick(cos_d: Scalar, f0: Spectrum) -> Spectrum:
     return f0 + (1.0 - f0) * (1.0 - cos_d) ** 5
 
 
-def f0_from_eta(eta: Spectrum) -> Spectrum:
+def f0_from_eta(eta: Numbers) -> Numbers:
     """((η−1)/(η+1))²."""
     return ((eta - 1.0) / (eta + 1.0)) ** 2
 
 
-def eta_from_f0(f0: Spectrum) -> Spectrum:
+def eta_from_f0(f0: Numbers) -> Numbers:
     """(1+√F0)/(1−√F0), the dielectric with that reflectance at normal incidence; needs F0 < 1."""
-    root = jnp.sqrt(f0)
+    root = f0**0.5
     return (1.0 + root) / (1.0 - root)

@@ -86,15 +86,22 @@ def predictive_band(posterior: Posterior, rows: np.ndarray) -> Float[np.ndarray,
     data = prepare(fit.measurements.rows(rows), noise)
     values, s = posterior.thinned(BAND_DRAWS)
     levels = np.random.default_rng(0).permutation((np.arange(len(s)) + 0.5) / len(s))
-    parts = (jnp.asarray(values), jnp.asarray(s), jnp.asarray(ndtri(levels)))
-    return np.asarray(_band(fit.model, data, *parts))[:, : len(rows)]
+    x = _draws(fit.model, data, jnp.asarray(values))
+    limits = _band(x, data.noise, jnp.asarray(s), jnp.asarray(ndtri(levels)))
+    return (np.asarray(limits) / np.asarray(data.kappa))[:, : len(rows)]
 
 
 @eqx.filter_jit
-def _band(template: AbstractBRDF, data: Data, values: Array, discrepancy: Array, normal: Array) -> Array:
-    def draw(value: Array, s: Array, e: Array) -> Array:
-        x = evaluate_pairs(with_vector(template, value), data.wi, data.wo) * data.kappa
-        return from_stabilised(stabilised(x, data.noise, s) + e, data.noise, s) / data.kappa
+def _draws(template: AbstractBRDF, data: Data, values: Array) -> Array:
+    """Model f κ of every draw, (d, n, c)."""
+    return jax.vmap(lambda v: evaluate_pairs(with_vector(template, v), data.wi, data.wo) * data.kappa)(values)
 
-    draws = jax.vmap(draw)(values, discrepancy, normal)
-    return jnp.quantile(draws, jnp.array([0.025, 0.975]), axis=0)
+
+@jax.jit
+def _band(x: Array, noise: Array, discrepancy: Array, normal: Array) -> Array:
+    """95 % limits of new measurements of x; apart from the model, so that one program serves all."""
+
+    def draw(x: Array, s: Array, e: Array) -> Array:
+        return from_stabilised(stabilised(x, noise, s) + e, noise, s)
+
+    return jnp.quantile(jax.vmap(draw)(x, discrepancy, normal), jnp.array([0.025, 0.975]), axis=0)

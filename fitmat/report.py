@@ -19,9 +19,10 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from fitmat import plots
-from fitmat.comparison import CLOSE, SIMILAR, Comparison, Estimate, fit_metrics
+from fitmat.comparison import CLOSE, SIMILAR, Comparison, Estimate
 from fitmat.display import interval, with_error
 from fitmat.measurement import Measurements
+from fitmat.metrics import fit_metrics
 from fitmat.outcome import RESULTS
 from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, Posterior
 from fitmat.prediction import sections

@@ -3,6 +3,7 @@
 Knows no model, no bounds and no noise.
 """
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -101,12 +102,14 @@ def least_squares(
     Returns:
         The last iterate and how the solve ended; never raises for numerical reasons.
     """
-    first, triangle = _compressed_point(residual, x0, args)
+    # Jitted, so that the several places of the solver's program that need it trace it once.
+    point = jax.jit(functools.partial(_compressed_point, residual))
+    first, triangle = point(x0, args)
     norm = jnp.sqrt(first @ first)
     unit = jnp.where(norm > 0, norm, 1.0)
     lengths = jnp.sqrt(jnp.sum(triangle**2, axis=0)) * jnp.sqrt(FIRST_DAMPING)
     scale = jnp.where(lengths > 0, unit / jnp.where(lengths > 0, lengths, 1.0), 1.0)
-    small = _compressed(residual)
+    small = _compressed(point)
     solver = LevenbergMarquardt(rtol=tolerance, atol=tolerance)
     solution = optx.least_squares(
         lambda u, a: small(u * scale, a) / unit, solver, x0 / scale, args, max_steps=max_steps, throw=False
@@ -137,7 +140,7 @@ def _compressed_point(
     return jnp.append(inside, outside), triangle
 
 
-def _compressed(residual: Callable[[Array, Any], Array]) -> Callable[[Array, Any], Array]:
+def _compressed(point: Callable[[Array, Any], tuple[Array, Array]]) -> Callable[[Array, Any], Array]:
     """The p + 1 numbers with the same norm and the same Gauss–Newton step as all residuals.
 
     The solver then carries p × p numbers through its loop however many rows there are.
@@ -145,11 +148,11 @@ def _compressed(residual: Callable[[Array, Any], Array]) -> Callable[[Array, Any
 
     @jax.custom_jvp
     def small(x: Array, args: Any) -> Array:
-        return _compressed_point(residual, x, args)[0]
+        return point(x, args)[0]
 
     @small.defjvp
     def _(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
-        value, triangle = _compressed_point(residual, *primals)
+        value, triangle = point(*primals)
         return value, jnp.append(triangle @ tangents[0], 0.0)
 
     return small

@@ -5,7 +5,6 @@ Takes all numbers from a posterior; formats nothing.
 
 import dataclasses
 
-import jax.numpy as jnp
 import numpy as np
 
 from fitmat.fresnel import eta_from_f0, f0_from_eta
@@ -114,10 +113,10 @@ def derived(posterior: Posterior) -> list[Quantity]:
         reflectance = ((eta - 1) ** 2 + square) / ((eta + 1) ** 2 + square)
         found.append(("f0", "F0", "reflectance at normal incidence", reflectance, "eta"))
     elif "eta" in names:
-        reflectance = np.asarray(f0_from_eta(jnp.asarray(of("eta"))))
+        reflectance = f0_from_eta(of("eta"))
         found.append(("f0", "F0", "reflectance at normal incidence", reflectance, "eta"))
     elif "f0" in names:
-        index = np.asarray(eta_from_f0(jnp.asarray(of("f0"))))
+        index = eta_from_f0(of("f0"))
         found.append(("eta", "η", "index of the dielectric with that F0", index, "f0"))
     if "alpha" in names:
         alpha = of("alpha")

@@ -20,10 +20,10 @@ from fitmat.outcome import Fit, inverse_information
 from fitmat.params import space, vector, with_vector
 from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, Diagnostics, Posterior, split_rhat
 
-CHUNK = 100
+CHUNK = 50
 """Steps between looks at the autocorrelation time."""
 
-SHORTEST = 400
+SHORTEST = 250
 """Steps that every chain has, however short its autocorrelation time."""
 
 HEAVY_TAIL = 6.0
@@ -98,7 +98,8 @@ def sample(
     try:
         while (done := sampler.iteration) < min(goal, max_steps):
             state = sampler.run_mcmc(state, min(CHUNK, max_steps - done), skip_initial_state_check=True)
-            goal = max(SHORTEST, _steps_needed(sampler, walkers))
+            if sampler.iteration >= SHORTEST:
+                goal = max(goal, _steps_needed(sampler, walkers))
             if progress is not None:
                 progress(sampler.iteration, min(max(goal, sampler.iteration), max_steps))
     except KeyboardInterrupt:

@@ -8,8 +8,9 @@ import pytest
 from oracles import ggx
 
 import fitmat as fm
-from fitmat.comparison import ALBEDO_ANGLES, Comparison, Estimate, compare, fit_metrics
+from fitmat.comparison import ALBEDO_ANGLES, Comparison, Estimate, compare
 from fitmat.errors import FitmatError
+from fitmat.metrics import fit_metrics
 from fitmat.outcome import Fit
 from fitmat.posterior import Posterior
 
