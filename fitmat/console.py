@@ -7,6 +7,7 @@ import contextlib
 import inspect
 import signal
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -20,13 +21,12 @@ from rich.text import Text
 from fitmat.brdf import LOBES, lobe_names, model
 from fitmat.comparison import Comparison, compare, is_empirical, is_microfacet
 from fitmat.errors import ModelError
-from fitmat.fitting import fit_each
 from fitmat.measurement import Measurements
 from fitmat.outcome import RESULTS
 from fitmat.params import entries
 from fitmat.posterior import Posterior
 from fitmat.report import rows
-from fitmat.uncertainty import laplace, sample
+from fitmat.uncertainty import laplace_each, sample
 
 
 def model_names(text: str) -> list[str]:
@@ -51,30 +51,38 @@ def study(
     A fixed parameter or a masking applies to every model that has it; at least one must. An interrupt during sampling
     keeps what was done and leaves the remaining models to Laplace's approximation.
     """
-    posteriors: list[Posterior] = []
     screen = Console(stderr=True)
     parts = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*parts, console=screen, transient=True, disable=not screen.is_terminal) as bar:
         fitting = bar.add_task(f"fitting {', '.join(names)}", total=None)
-        fits = fit_each(measurements, {name: _options(name, names, fixed, masking) for name in names})
+        jobs = {name: _options(name, names, fixed, masking) for name in names}
+        first = laplace_each(measurements, jobs, seed=seed)
         bar.update(fitting, total=1, completed=1)
-        for found in fits:
-            if not (sampling and found.finite):
-                posteriors.append(laplace(found, seed=seed))
-                continue
-            task = bar.add_task(f"sampling {found.name}", total=None)
-            with _interrupt_later() as asked:
+        with ThreadPoolExecutor(1) as pool:
+            # The match of the approximations: the answer without sampling, and compiled for the one with it.
+            match = pool.submit(_match, first)
+            posteriors = _sampled(first, bar, seed) if sampling else first
+            bar.add_task("comparing", total=None)
+            return posteriors, match.result() if posteriors == first else _match(posteriors)
 
-                def progress(done: int, total: int, task: TaskID = task, asked: list[int] = asked) -> None:
-                    bar.update(task, completed=done, total=total)
-                    if asked:
-                        raise KeyboardInterrupt
 
-                posterior = sample(found, seed=seed, progress=progress)
-            posteriors.append(posterior)
-            sampling = not posterior.interrupted
-        bar.add_task("comparing", total=None)
-        return posteriors, _match(posteriors)
+def _sampled(first: Sequence[Posterior], bar: Progress, seed: int) -> list[Posterior]:
+    """Sample one fit after the other; after an interrupt, and for fits that are not finite, Laplace's draws stay."""
+    posteriors: list[Posterior] = []
+    for approximate in first:
+        if not approximate.fit.finite or any(posterior.interrupted for posterior in posteriors):
+            posteriors.append(approximate)
+            continue
+        task = bar.add_task(f"sampling {approximate.fit.name}", total=None)
+        with _interrupt_later() as asked:
+
+            def progress(done: int, total: int, task: TaskID = task, asked: list[int] = asked) -> None:
+                bar.update(task, completed=done, total=total)
+                if asked:
+                    raise KeyboardInterrupt
+
+            posteriors.append(sample(approximate.fit, seed=seed, progress=progress))
+    return posteriors
 
 
 @contextlib.contextmanager

@@ -4,8 +4,6 @@ Gives the best parameters, how sure the data are of them locally (covariance), a
 """
 
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -92,21 +90,6 @@ def fit(
     starts = starting_points(template, data, first, held, STARTS)
     ends = jax.device_get(_refine(template, data, jnp.asarray(starts), first, tuple(int(k) for k in free), max_steps))
     return conclude(measurements, template, held, (found_noise, data), ends)
-
-
-def fit_each(measurements: Measurements, jobs: Mapping[str, Mapping[str, Any]]) -> list[Fit]:
-    """`fit` of several models, side by side in threads: most of a first fit is compilation, which needs no Python lock.
-
-    Args:
-        measurements: From `fitmat.read`.
-        jobs: Model name → keyword arguments of `fit`.
-
-    Raises:
-        FitmatError: as `fit`, for the first model that cannot be fitted.
-    """
-    with ThreadPoolExecutor() as pool:
-        pending = [pool.submit(fit, measurements, name, **options) for name, options in jobs.items()]
-        return [job.result() for job in pending]
 
 
 def _held(template: AbstractBRDF, fixed: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:

@@ -5,7 +5,8 @@ f0), linearly for kd, ks and the discrepancy s ≥ 0. This is the only room that
 """
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import equinox as eqx
@@ -13,9 +14,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from fitmat import fitting
 from fitmat.brdf import AbstractBRDF
 from fitmat.errors import FitmatError
 from fitmat.likelihood import Data, log_likelihood, mapped, noise_scale
+from fitmat.measurement import Measurements
 from fitmat.outcome import Fit, inverse_information
 from fitmat.params import space, vector, with_vector
 from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, Diagnostics, Posterior, split_rhat
@@ -50,6 +53,25 @@ def laplace(fit: Fit, *, seed: int) -> Posterior:
     natural = _laplace_draws(fit, LAPLACE_DRAWS, np.random.default_rng(seed))
     values, discrepancy = _physical(fit, natural)
     return Posterior(fit, "laplace", values, discrepancy)
+
+
+def laplace_each(measurements: Measurements, jobs: Mapping[str, Mapping[str, Any]], *, seed: int) -> list[Posterior]:
+    """`fit` and `laplace` of several models, side by side in threads: most of a first fit is compilation.
+
+    Args:
+        measurements: From `fitmat.read`.
+        jobs: Model name → keyword arguments of `fit`.
+        seed: Of the draws.
+
+    Raises:
+        FitmatError: as `fit`, for the first model that cannot be fitted.
+    """
+
+    def one(name: str) -> Posterior:
+        return laplace(fitting.fit(measurements, name, **jobs[name]), seed=seed)
+
+    with ThreadPoolExecutor() as pool:
+        return list(pool.map(one, jobs))
 
 
 def sample(
