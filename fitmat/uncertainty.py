@@ -5,6 +5,7 @@ f0), linearly for kd, ks and the discrepancy s ≥ 0. This is the only room that
 """
 
 import dataclasses
+import importlib
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -71,7 +72,9 @@ def laplace_each(measurements: Measurements, jobs: Mapping[str, Mapping[str, Any
         return laplace(fitting.fit(measurements, name, **jobs[name]), seed=seed)
 
     with ThreadPoolExecutor() as pool:
-        return list(pool.map(one, jobs))
+        pending = [pool.submit(one, name) for name in jobs]
+        importlib.import_module("emcee")  # slow to load, and this thread has nothing else to do
+        return [job.result() for job in pending]
 
 
 def sample(

@@ -16,7 +16,7 @@ from fitmat.likelihood import log_likelihood, noise_scale
 from fitmat.outcome import Fit
 from fitmat.params import space, vector, with_vector
 from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, Diagnostics, Posterior, split_rhat
-from fitmat.uncertainty import log_posterior
+from fitmat.uncertainty import CHUNK, log_posterior
 
 QUANTILE = 0.15
 """In standard deviations: three Monte Carlo errors, 2.7/√ESS, of an outer quantile from about 1600 effective draws,
@@ -177,8 +177,8 @@ def test_an_interrupt_keeps_what_was_done(fit: Fit, calls: int) -> None:
     kept = fm.sample(fit, seed=1, max_steps=350, progress=stop)
     assert kept.interrupted
     assert kept.diagnostics is not None
-    assert kept.diagnostics.steps == 100 * calls
-    assert [done for done, _ in seen] == [100, 200][:calls]
+    assert kept.diagnostics.steps == CHUNK * calls
+    assert [done for done, _ in seen] == [CHUNK, 2 * CHUNK][:calls]
     assert all(done <= expected <= 350 for done, expected in seen)
 
 
