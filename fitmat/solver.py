@@ -30,11 +30,13 @@ class Minimum(eqx.Module):
         x: Parameters, (p,).
         result: An `optimistix.RESULTS` member.
         steps: Iterations used.
+        offset: Relative offset of Bates & Watts (1981): the next Gauss–Newton step in units of the standard errors.
     """
 
     x: Float[Array, " p"]
     result: optx.RESULTS
     steps: Int[Array, ""]
+    offset: Float[Array, ""]
 
 
 class TrustRegion(optx.AbstractSearch):
@@ -114,7 +116,10 @@ def least_squares(
     solution = optx.least_squares(
         lambda u, a: small(u * scale, a) / unit, solver, x0 / scale, args, max_steps=max_steps, throw=False
     )
-    return Minimum(solution.value * scale, solution.result, solution.stats["num_steps"])
+    last = solution.state.f_info.residual
+    freedom = jax.eval_shape(residual, x0, args).size / len(x0) - 1.0
+    offset = jnp.sqrt(freedom * (last[:-1] @ last[:-1])) / jnp.maximum(last[-1], jnp.finfo(last.dtype).tiny)
+    return Minimum(solution.value * scale, solution.result, solution.stats["num_steps"], offset)
 
 
 def _compressed_point(
