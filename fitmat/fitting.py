@@ -28,7 +28,7 @@ from fitmat.likelihood import (
 from fitmat.measurement import Measurements
 from fitmat.outcome import Ends, Fit, conclude, free_places
 from fitmat.params import Space, check_range, entries, space, vector, with_vector
-from fitmat.solver import Minimum, least_squares
+from fitmat.solver import Minimum, Units, least_squares
 from fitmat.starts import starting_points
 
 STARTS = 6
@@ -39,6 +39,9 @@ ROUNDS = 12
 
 MANY_ROWS = 8000
 """Above this many rows a fit converges on an evenly spread part first, then on all of them."""
+
+LITTLE_DAMPING = 1e-3
+"""How much smaller the first damping is on all rows than on the part."""
 
 STEADY = 1e-4
 """Relative offset (Bates & Watts 1981, who ask for 1e-3) at which a fit has converged even if its last digits move."""
@@ -180,12 +183,14 @@ def descend(chart: Chart, data: Data, values: Array, u: Array, s: Array, *, max_
         data, values, s, measured = args
         return residuals_from(measured, chart.model(values, u), data, s)
 
-    def minimum(data: Data, u: Array) -> Minimum:
+    def minimum(data: Data, u: Array, units: Units | None) -> Minimum:
         measured = stabilised(data.x, data.noise, s)
-        return least_squares(residual, u, (data, values, s, measured), max_steps=max_steps)
+        return least_squares(residual, u, (data, values, s, measured), max_steps=max_steps, units=units)
 
     rows = data.x.shape[0]
-    if rows > MANY_ROWS:
-        stride = rows // (MANY_ROWS // 2)
-        u = minimum(jax.tree.map(lambda part: part[::stride], data), u).x
-    return minimum(data, u)
+    if rows <= MANY_ROWS:
+        return minimum(data, u, None)
+    stride = rows // (MANY_ROWS // 2)
+    coarse = minimum(jax.tree.map(lambda part: part[::stride], data), u, None)
+    # So close to the end hardly any damping is needed: λ is relative to the square of the unit.
+    return minimum(data, coarse.x, Units(coarse.units.x * LITTLE_DAMPING**-0.5, coarse.units.residual * stride**0.5))

@@ -23,6 +23,13 @@ TALL = 20_000
 """From this many residuals on, JᵀJ is formed instead of a QR factorisation of J."""
 
 
+class Units(eqx.Module):
+    """In what a problem is measured: `x` for each parameter, `residual` for all residuals together."""
+
+    x: Float[Array, " p"]
+    residual: Float[Array, ""]
+
+
 class Minimum(eqx.Module):
     """Where a solve ended.
 
@@ -30,6 +37,7 @@ class Minimum(eqx.Module):
         x: Parameters, (p,).
         result: An `optimistix.RESULTS` member.
         steps: Iterations used.
+        units: The problem's units, to reuse for a similar problem.
         offset: Relative offset of Bates & Watts (1981): the next Gauss–Newton step in units of the standard errors.
     """
 
@@ -37,6 +45,7 @@ class Minimum(eqx.Module):
     result: optx.RESULTS
     steps: Int[Array, ""]
     offset: Float[Array, ""]
+    units: Units
 
 
 class TrustRegion(optx.AbstractSearch):
@@ -88,6 +97,7 @@ def least_squares(
     *,
     tolerance: float = RTOL,
     max_steps: int = 256,
+    units: Units | None = None,
 ) -> Minimum:
     """Minimise ½Σ residual² from x0.
 
@@ -100,26 +110,32 @@ def least_squares(
         args: Passed on.
         tolerance: Both the relative and the absolute tolerance in the scaled units.
         max_steps: Iterations before giving up.
+        units: Those of a similar problem, which saves one look at all residuals.
 
     Returns:
         The last iterate and how the solve ended; never raises for numerical reasons.
     """
     # Jitted, so that the several places of the solver's program that need it trace it once.
     point = jax.jit(functools.partial(_compressed_point, residual))
-    first, triangle = point(x0, args)
-    norm = jnp.sqrt(first @ first)
-    unit = jnp.where(norm > 0, norm, 1.0)
-    lengths = jnp.sqrt(jnp.sum(triangle**2, axis=0)) * jnp.sqrt(FIRST_DAMPING)
-    scale = jnp.where(lengths > 0, unit / jnp.where(lengths > 0, lengths, 1.0), 1.0)
-    small = _compressed(point)
+    if units is None:
+        units = _natural_units(*point(x0, args))
+    small, by = _compressed(point), units
     solver = LevenbergMarquardt(rtol=tolerance, atol=tolerance)
     solution = optx.least_squares(
-        lambda u, a: small(u * scale, a) / unit, solver, x0 / scale, args, max_steps=max_steps, throw=False
+        lambda u, a: small(u * by.x, a) / by.residual, solver, x0 / by.x, args, max_steps=max_steps, throw=False
     )
     last = solution.state.f_info.residual
-    freedom = jax.eval_shape(residual, x0, args).size / len(x0) - 1.0
+    freedom = jax.eval_shape(residual, x0, args).size / max(len(x0), 1) - 1.0
     offset = jnp.sqrt(freedom * (last[:-1] @ last[:-1])) / jnp.maximum(last[-1], jnp.finfo(last.dtype).tiny)
-    return Minimum(solution.value * scale, solution.result, solution.stats["num_steps"], offset)
+    return Minimum(solution.value * by.x, solution.result, solution.stats["num_steps"], offset, units)
+
+
+def _natural_units(value: Float[Array, " p+1"], triangle: Float[Array, "p p"]) -> Units:
+    """Columns of the Jacobian of the length that makes λ = 1 the first damping, and residuals of norm 1."""
+    norm = jnp.sqrt(value @ value)
+    unit = jnp.where(norm > 0, norm, 1.0)
+    lengths = jnp.sqrt(jnp.sum(triangle**2, axis=0) * FIRST_DAMPING)
+    return Units(jnp.where(lengths > 0, unit / jnp.where(lengths > 0, lengths, 1.0), 1.0), unit)
 
 
 def _compressed_point(

@@ -82,7 +82,7 @@ def sample(
     *,
     seed: int,
     walkers: int | None = None,
-    max_steps: int = 20_000,
+    max_steps: int = 8_000,
     progress: Progress | None = None,
 ) -> Posterior:
     """Sample the posterior with emcee until the autocorrelation time says enough.
@@ -205,7 +205,9 @@ def _laplace_gaussian(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     span = (whole.natural_upper - whole.natural_lower)[free]
     centre = np.append(whole.natural_array(fit.values)[free], fit.discrepancy)
     covariance = np.zeros((len(centre),) * 2)
-    covariance[:-1, :-1] = inverse_information(fit.information[np.ix_(free, free)], span)
+    # The flat prior counts with the variance of its range: a direction that no datum determines is no wider than it.
+    information = fit.information[np.ix_(free, free)] + np.diag(12.0 / span**2)
+    covariance[:-1, :-1] = inverse_information(information, span)
     covariance[-1, -1] = _discrepancy_sd(fit) ** 2
     return centre, covariance
 
