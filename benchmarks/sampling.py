@@ -107,7 +107,7 @@ def main() -> None:
     jax.config.update("jax_enable_x64", True)
     print(machine.described(), "\n")
     m = fits.measured(chosen.rows)
-    found, peer = fm.fit(m, "lambert+ggx"), fits.problem(m)
+    found, peer = fm.fit(m, "lambert+ggx"), fits.problem(m, hoisted=True)
     check_density(found, peer)
     fitmats(found, 0)
     names = ("fitmat.sample", "user", "batched", "exchanged")
