@@ -232,7 +232,7 @@ def test_the_scores_notice_a_wrong_truth() -> None:
 
 
 def test_no_seed_makes_the_unidentifiable_look_determined() -> None:
-    """A fit that slides along the ridge of ks and eta until it meets a bound must not quote a small sd for the other."""
+    """A fit that slides along the ridge of ks and eta until it meets a bound must quote no small sd for the other."""
     material = next(m for m in MATERIALS if m.not_determined)
     for seed in range(20):
         found = fit(dataclasses.replace(material, seed=seed).measured(), material.model)
