@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.brdf import AbstractBRDF
+from fitmat.brdf import LOBES, AbstractBRDF, lobe_names
 from fitmat.energy import incidence, incidence_rule, lobe_rule
 from fitmat.errors import FitmatError
 from fitmat.measurement import Measurements
@@ -144,8 +144,8 @@ def is_empirical(name: str) -> bool:
 
 
 def is_microfacet(name: str) -> bool:
-    """Whether a model name has a microfacet lobe."""
-    return any(part.startswith(("ggx", "beckmann", "cook-torrance")) for part in name.split("+"))
+    """Whether a model name has a lobe with a Fresnel term."""
+    return any(LOBES[part].fresnel is not None for part in lobe_names(name))
 
 
 def compare(one: Posterior, other: Posterior) -> Comparison:
