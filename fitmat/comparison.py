@@ -12,11 +12,11 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat.brdf import LOBES, AbstractBRDF, lobe_names
-from fitmat.energy import incidence, incidence_rule, lobe_rule
 from fitmat.errors import FitmatError
 from fitmat.measurement import Measurements
 from fitmat.params import with_vector
 from fitmat.posterior import Posterior
+from fitmat.quadrature import incidence_rule, lobe_rule
 
 DRAWS = 200
 """Posterior draws behind every interval of the match."""
@@ -24,8 +24,8 @@ DRAWS = 200
 ALBEDO_ANGLES = np.deg2rad(np.arange(0.0, 86.0, 5.0))
 """Incidence angles of the albedo curves, radians."""
 
-EMPIRICAL = ("phong", "blinn-phong", "blinn-phong-exact")
-"""Lobes that the match calls empirical; lobes with a Fresnel term are microfacet lobes."""
+AZIMUTHS = 4
+"""Azimuths of incidence over half a turn, where a model is anisotropic."""
 
 CLOSE, SIMILAR = 0.1, 0.3
 """Hemisphere distances up to which the verdict says "hardly differ" and "differ moderately"."""
@@ -140,12 +140,12 @@ def _evidence(delta_bic: float, names: tuple[str, str]) -> str:
 
 def is_empirical(name: str) -> bool:
     """Whether a model name has an empirical specular lobe."""
-    return any(part in EMPIRICAL for part in name.split("+"))
+    return any(LOBES[part].kind == "empirical" for part in lobe_names(name))
 
 
 def is_microfacet(name: str) -> bool:
     """Whether a model name has a lobe with a Fresnel term."""
-    return any(LOBES[part].fresnel is not None for part in lobe_names(name))
+    return any(LOBES[part].kind == "microfacet" for part in lobe_names(name))
 
 
 def compare(one: Posterior, other: Posterior) -> Comparison:
@@ -164,9 +164,9 @@ def compare(one: Posterior, other: Posterior) -> Comparison:
     """
     empirical, microfacet = (one, other) if is_empirical(one.fit.name) else (other, one)
     if not (is_empirical(empirical.fit.name) and is_microfacet(microfacet.fit.name)):
+        known = ", ".join(name for name, lobe in LOBES.items() if lobe.kind == "empirical")
         raise FitmatError(
-            f"compare needs one empirical ({', '.join(EMPIRICAL)}) and one microfacet model, "
-            f"got {one.fit.name} and {other.fit.name}."
+            f"compare needs one empirical ({known}) and one microfacet model, got {one.fit.name} and {other.fit.name}."
         )
     for fit in (one.fit, other.fit):
         if not fit.finite:
@@ -235,9 +235,13 @@ def _distances(
     hemisphere, measured = slice(0, len(theta)), slice(len(theta), len(theta) + len(angles))
     albedo = slice(len(theta) + len(angles), None)
 
-    def at(theta_i: Array, p: AbstractBRDF, m: AbstractBRDF) -> tuple[Array, ...]:
+    isotropic = empirical.isotropic and microfacet.isotropic
+    turns = jnp.zeros(1) if isotropic else (jnp.arange(AZIMUTHS) + 0.5) * jnp.pi / AZIMUTHS
+
+    def at(theta_i: Array, phi_i: Array, p: AbstractBRDF, m: AbstractBRDF) -> tuple[Array, ...]:
         """Integrals over ω_o: squared difference, square, squared root difference, solid angle, both albedos."""
-        wi, rule = incidence(theta_i), lobe_rule(theta_i, jnp.minimum(p.width(), m.width()))
+        rule = lobe_rule(theta_i, jnp.minimum(p.width(), m.width()), phi_i=None if isotropic else phi_i)
+        wi = rule.wi
         f_p, f_m = (jax.vmap(lambda wo, f=f: jnp.atleast_1d(f(wi, wo)))(rule.wo) for f in (p, m))
         solid = jnp.where(rule.weight > 0, rule.weight / jnp.maximum(rule.wo[:, 2], 1e-12), 0.0)
         roots = (jnp.cbrt(f_p * wi[2]) - jnp.cbrt(f_m * wi[2])) ** 2
@@ -247,7 +251,8 @@ def _distances(
 
     def pair(both: tuple[Array, Array]) -> tuple[Array, Array, Array, Array, Array]:
         p, m = with_vector(empirical, both[0]), with_vector(microfacet, both[1])
-        difference, square, roots, solid, one, other = jax.vmap(lambda t: at(t, p, m))(nodes)
+        every = jax.vmap(lambda turn: jax.vmap(lambda t: at(t, turn, p, m))(nodes))(turns)
+        difference, square, roots, solid, one, other = (part.mean(axis=0) for part in every)
         flat, cosines = weight / jnp.cos(theta), jnp.cos(angles)
         return (
             jnp.sqrt((weight @ difference[hemisphere]) / (weight @ square[hemisphere])),

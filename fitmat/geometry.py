@@ -18,6 +18,8 @@ numbers               float64
 Nothing here knows about reflectance.
 """
 
+from typing import NamedTuple
+
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
@@ -70,6 +72,33 @@ def half_vector(wi: Vec3, wo: Vec3) -> Vec3:
 def cos_difference(wi: Vec3, wo: Vec3) -> Scalar:
     """c_d = ω_i·h = √((1 + ω_i·ω_o)/2), in [0, 1]."""
     return jnp.sqrt(jnp.clip((1.0 + _dot(wi, wo)) / 2.0, _TINY, 1.0))
+
+
+class Pair(NamedTuple):
+    """Two directions and what lies halfway between them.
+
+    Attributes:
+        wi: Unit vector to the light.
+        wo: Unit vector to the sensor.
+        h: Half vector.
+        cos_d: ω_i·h.
+    """
+
+    wi: Vec3
+    wo: Vec3
+    h: Vec3
+    cos_d: Scalar
+
+
+def pair(wi: Vec3, wo: Vec3) -> Pair:
+    """The directions with their half vector and cos_d; see `half_vector` and `cos_difference`."""
+    return Pair(wi, wo, half_vector(wi, wo), cos_difference(wi, wo))
+
+
+def rotated(w: Vec3, angle: Scalar) -> Vec3:
+    """A direction turned by `angle` (radians, counter-clockwise seen from above) about the normal."""
+    sin, cos = jnp.sin(angle), jnp.cos(angle)
+    return jnp.stack([cos * w[0] - sin * w[1], sin * w[0] + cos * w[1], w[2]])
 
 
 def mirror(direction: Vec3) -> Vec3:

@@ -102,7 +102,7 @@ def _walk(module: Any, owner: str) -> list[tuple[str, str, Param, tuple[int, ...
             for part in value:
                 found += _walk(part, getattr(part, "name", owner))
         elif isinstance(value, eqx.Module):
-            found += _walk(value, owner)
+            found += _walk(value, getattr(value, "name", owner))
     return found
 
 

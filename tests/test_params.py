@@ -1,5 +1,6 @@
 """Parameters: names, order, bounds, and the change of variables that keeps a fit inside them."""
 
+import dataclasses
 from typing import Any
 
 import equinox as eqx
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 import fitmat as fm
 from fitmat.brdf import LOBES
 from fitmat.errors import ModelError
+from fitmat.laws import example
 from fitmat.params import (
     AT_BOUND,
     EDGE,
@@ -52,14 +54,21 @@ def test_shared_names_carry_their_lobe() -> None:
     assert names[4:] == ["beckmann-schlick.ks", "beckmann-schlick.alpha", "beckmann-schlick.f0"]
 
 
-@pytest.mark.parametrize("name", LOBES)
+def _holders(module: Any) -> list[Any]:
+    """The module and all modules in it."""
+    values = [getattr(module, field.name) for field in dataclasses.fields(module)]
+    inner = [part for value in values for part in (value if isinstance(value, tuple) else (value,))]
+    return [module, *(found for part in inner if isinstance(part, eqx.Module) for found in _holders(part))]
+
+
+@pytest.mark.parametrize("name", [*(example(lobe) for lobe in LOBES), "lambert+ggx"])
 def test_every_entry_points_at_its_own_number(name: str) -> None:
     """Names and vector come from two walks over the model; they must agree on the order."""
     built = fm.model(name, channels=2)
     values = np.arange(1.0, 1 + len(vector(built)))
-    for entry in entries(with_vector(built, jnp.array(values))):
-        owner: Any = with_vector(built, jnp.array(values))
-        holder = owner if hasattr(owner, entry.name) else owner.fresnel
+    numbered = with_vector(built, jnp.array(values))
+    for entry in entries(numbered):
+        (holder,) = (part for part in _holders(numbered) if hasattr(part, entry.name))
         np.testing.assert_array_equal(np.ravel(getattr(holder, entry.name)), values[entry.place])
 
 

@@ -7,3 +7,4 @@ from fitmat.brdf.base import padded_length as padded_length
 from fitmat.brdf.registry import LOBES as LOBES
 from fitmat.brdf.registry import lobe_names as lobe_names
 from fitmat.brdf.registry import model as model
+from fitmat.brdf.registry import normalised as normalised

@@ -4,6 +4,9 @@ No formula of any material stands here.
 """
 
 from abc import abstractmethod
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import ClassVar
 
 import equinox as eqx
 import jax
@@ -16,7 +19,13 @@ from fitmat.errors import ModelError
 
 
 class AbstractBRDF(eqx.Module):
-    """A reflectance model; its `param` fields are what can be fitted."""
+    """A reflectance model; its `param` fields are what can be fitted.
+
+    Attributes:
+        breaks: Law → how the model breaks it, in a sentence; see `fitmat.laws`.
+    """
+
+    breaks: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     @property
     @abstractmethod
@@ -36,6 +45,15 @@ class AbstractBRDF(eqx.Module):
     def width(self) -> Scalar:
         """Slope-like width of the narrowest lobe, in (0, 1]: what a quadrature over directions must resolve."""
 
+    @property
+    @abstractmethod
+    def isotropic(self) -> bool:
+        """Whether only the difference of the two azimuths counts."""
+
+    @abstractmethod
+    def diffuse_albedo(self) -> Spectrum:
+        """Albedo of what leaves in all directions alike, in [0, 1]; what a coat above sends back and forth."""
+
 
 class Sum(AbstractBRDF):
     """The sum of lobes, each with its own parameters; usually one diffuse and one specular lobe."""
@@ -54,6 +72,15 @@ class Sum(AbstractBRDF):
     def width(self) -> Scalar:
         """That of the narrowest lobe."""
         return jnp.min(jnp.stack([lobe.width() for lobe in self.lobes]))
+
+    @property
+    def isotropic(self) -> bool:
+        """Where all lobes are."""
+        return all(lobe.isotropic for lobe in self.lobes)
+
+    def diffuse_albedo(self) -> Spectrum:
+        """The sum over the lobes, at most 1."""
+        return jnp.minimum(sum((lobe.diffuse_albedo() for lobe in self.lobes[1:]), self.lobes[0].diffuse_albedo()), 1.0)
 
 
 def evaluate_pairs(model: AbstractBRDF, wi: Directions, wo: Directions) -> Samples:

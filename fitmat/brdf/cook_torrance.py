@@ -1,14 +1,18 @@
 """Cook and Torrance's model of 1982 with its own constants."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import ClassVar
+
 import equinox as eqx
 import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.brdf.base import AbstractBRDF
+from fitmat.brdf.microfacet import lobe_weight
 from fitmat.fresnel import AbstractFresnel, Dielectric
-from fitmat.geometry import above, cos_difference, half_vector
-from fitmat.microfacet import Beckmann, Masking, visibility
-from fitmat.params import param
+from fitmat.geometry import above, pair
+from fitmat.microfacet import Beckmann, Isotropic, Masking, visibility
 
 
 class CookTorrance(AbstractBRDF):
@@ -18,7 +22,8 @@ class CookTorrance(AbstractBRDF):
 
     Parameters: ks, weight of the lobe, 0 to 10, per channel with the exact dielectric, shared with Schlick and
     conductor; alpha, the paper's slope m, 0.0001 to 1, shared: 0.1 is satin, 0.5 dull; and the Fresnel level: eta
-    (exact dielectric, shared), or f0 (`-schlick`, per channel), or eta and kappa (`-conductor`, per channel).
+    (exact dielectric, shared), f0 (`-schlick`, per channel), f0 and f82 (`-f82`), or eta and kappa (`-conductor`,
+    `-belcour`, per channel).
 
     Static choice: masking = "v-cavity" (the paper's, the default), "correlated", "separable".
 
@@ -31,12 +36,12 @@ class CookTorrance(AbstractBRDF):
     Example: `fm.model("lambert+cook-torrance", kd=0.3, ks=0.25, alpha=0.2, eta=1.5)`
     """
 
-    ks: Spectrum = param(0.0, 10.0, symbol="k_s", per_channel=True, weight=True, default=1.0, doc="specular weight")
-    alpha: Scalar = param(
-        1e-4, 1.0, symbol="m", scale="log", default=0.3,
-        starts=(0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4, 0.7),
-        doc="root-mean-square slope of the facets, the paper's m",
-    )  # fmt: skip
+    breaks: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {"energy": "with ks = 1 it reflects up to 4 F0 of the light: D' = π D, and π where Walter has 4"}
+    )
+
+    ks: Spectrum = lobe_weight()
+    roughness: Isotropic = eqx.field(default_factory=Isotropic)
     fresnel: AbstractFresnel = eqx.field(default_factory=Dielectric)
     masking: Masking = eqx.field(static=True, default="v-cavity")
 
@@ -47,11 +52,20 @@ class CookTorrance(AbstractBRDF):
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """ks F D' G/(π c_i c_o), where D' = π D of the normalised Beckmann distribution."""
-        h, cos_d = half_vector(wi, wo), cos_difference(wi, wo)
-        density = jnp.pi * Beckmann().density(h, self.alpha)
-        g_cc = visibility(Beckmann(), self.masking, self.alpha, (wi[2], wo[2], h[2], cos_d))
-        return jnp.where(above(wi, wo), self.ks * self.fresnel(cos_d) * density * g_cc / jnp.pi, 0.0)
+        p, slopes = pair(wi, wo), self.roughness.slopes
+        density = jnp.pi * Beckmann().density(p.h, slopes)
+        g_cc = visibility(Beckmann(), self.masking, slopes, p)
+        return jnp.where(above(wi, wo), self.ks * self.fresnel(p.cos_d) * density * g_cc / jnp.pi, 0.0)
 
     def width(self) -> Scalar:
         """Alpha itself."""
-        return self.alpha
+        return self.roughness.alpha
+
+    @property
+    def isotropic(self) -> bool:
+        """Yes."""
+        return True
+
+    def diffuse_albedo(self) -> Spectrum:
+        """None."""
+        return jnp.zeros(())

@@ -38,3 +38,12 @@ class Lambert(AbstractBRDF):
     def width(self) -> Scalar:
         """As wide as the hemisphere."""
         return jnp.array(1.0)
+
+    @property
+    def isotropic(self) -> bool:
+        """Yes."""
+        return True
+
+    def diffuse_albedo(self) -> Spectrum:
+        """The parameter itself."""
+        return self.kd

@@ -1,6 +1,8 @@
 """The empirical lobes of Phong and Blinn: a cosine to a power, with a named normalisation."""
 
-from typing import Any
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, ClassVar
 
 import jax.numpy as jnp
 
@@ -70,6 +72,15 @@ class Phong(AbstractBRDF):
         """Half that of Blinn's lobe: the angle to the mirror direction is twice the angle to h."""
         return _blinn_width(self.exponent) / 2.0
 
+    @property
+    def isotropic(self) -> bool:
+        """Yes."""
+        return True
+
+    def diffuse_albedo(self) -> Spectrum:
+        """None."""
+        return jnp.zeros(())
+
 
 class BlinnPhong(AbstractBRDF):
     """Blinn–Phong 1976 with the normalisation of real-time shading courses.
@@ -88,6 +99,10 @@ class BlinnPhong(AbstractBRDF):
     Example: `fm.model("lambert+blinn-phong", kd=0.3, ks=0.05, exponent=100)`
     """
 
+    breaks: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {"energy": "with ks = 1 it reflects up to 7.5 % more than it receives: albedo 1.063 at n = 4, 1.075 at n = 10"}
+    )
+
     ks: Spectrum = _ks()
     exponent: Scalar = _exponent()
 
@@ -105,6 +120,15 @@ class BlinnPhong(AbstractBRDF):
     def width(self) -> Scalar:
         """√(2/(n+2))."""
         return _blinn_width(self.exponent)
+
+    @property
+    def isotropic(self) -> bool:
+        """Yes."""
+        return True
+
+    def diffuse_albedo(self) -> Spectrum:
+        """None."""
+        return jnp.zeros(())
 
 
 class BlinnPhongExact(AbstractBRDF):
@@ -140,3 +164,12 @@ class BlinnPhongExact(AbstractBRDF):
     def width(self) -> Scalar:
         """√(2/(n+2))."""
         return _blinn_width(self.exponent)
+
+    @property
+    def isotropic(self) -> bool:
+        """Yes."""
+        return True
+
+    def diffuse_albedo(self) -> Spectrum:
+        """None."""
+        return jnp.zeros(())

@@ -1,24 +1,39 @@
-"""Model names: which lobes there are, and how a name such as `lambert+ggx-schlick` becomes a model.
+"""Model names: which lobes there are, and how a name such as `varnish-over-lambert+ggx-schlick` becomes a model.
 
 Knows no formula; every lobe is described where it is defined.
 """
 
 import dataclasses
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, Literal
 
+import equinox as eqx
 import numpy as np
 from jaxtyping import ArrayLike
 
 from fitmat.brdf.base import AbstractBRDF, Sum
+from fitmat.brdf.coating import RoughCoat, SmoothCoat, Varnish
 from fitmat.brdf.cook_torrance import CookTorrance
+from fitmat.brdf.kulla_conty import KullaConty
 from fitmat.brdf.lambert import Lambert
+from fitmat.brdf.microfacet import Microfacet
 from fitmat.brdf.phong import BlinnPhong, BlinnPhongExact, Phong
-from fitmat.brdf.walter import Microfacet
+from fitmat.brdf.plastic import Plastic
+from fitmat.brdf.tilt import Tilted
+from fitmat.brdf.walter import Walter
 from fitmat.errors import ModelError
-from fitmat.fresnel import AbstractFresnel, Conductor, Dielectric, Schlick
-from fitmat.microfacet import GGX, MASKINGS, AbstractDistribution, Beckmann
-from fitmat.params import as_parameter, check_range
+from fitmat.fresnel import F82, Conductor, Dielectric, Schlick
+from fitmat.fresnel_basis import Belcour
+from fitmat.microfacet import GGX, MASKINGS, Anisotropic, Beckmann, BeckmannRational, Isotropic
+from fitmat.params import Param, as_parameter, check_range
+
+OVER = "-over-"
+"""Between a coat, or a tilted mount, and what lies below it."""
+
+FRESNELS = (Dielectric, Schlick, F82, Conductor, Belcour)
+"""Fresnel terms that any microfacet lobe can carry, in the order of their suffixes in `fitmat models`."""
+
+Kind = Literal["diffuse", "empirical", "microfacet", "cover"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,61 +42,133 @@ class Lobe:
 
     Attributes:
         shape: The lobe's class; its docstring is the manual page.
-        fresnel: Its Fresnel term, None for lobes that have none.
-        distribution: Its distribution of normals where the class leaves that open.
+        kind: "diffuse", "empirical", "microfacet" (with a Fresnel term), or "cover" (stands over a base).
+        parts: Field of the class → the module it is made of: roughness, Fresnel term, distribution.
     """
 
     shape: Callable[..., AbstractBRDF]
-    fresnel: type[AbstractFresnel] | None = None
-    distribution: type[AbstractDistribution] | None = None
+    kind: Kind
+    parts: Mapping[str, type[eqx.Module]] = dataclasses.field(default_factory=dict)
 
-    def defaults(self) -> dict[str, tuple[Any, Any]]:
-        """Parameter name → (its `Param`, its default value)."""
-        classes = [self.shape] + ([self.fresnel] if self.fresnel else [])
-        fields = [field for cls in classes for field in dataclasses.fields(cls)]  # pyright: ignore[reportArgumentType]
-        return {f.name: (f.metadata["param"], f.default) for f in fields if "param" in f.metadata}
+    def defaults(self) -> dict[str, tuple[Param, Any]]:
+        """Parameter name → (its `Param`, its default value), in the order of the model's vector."""
+        found = {}
+        for field in _fields(self.shape):
+            inner = _fields(self.parts[field.name]) if field.name in self.parts else (field,)
+            found |= {f.name: (f.metadata["param"], f.default) for f in inner if "param" in f.metadata}
+        return found
 
     def per_channel(self, name: str) -> bool:
         """Whether `name` has one value per channel; ks is shared where the Fresnel level is per channel."""
-        if name == "ks" and self.fresnel is not None:
-            return not any(f.metadata["param"].per_channel for f in dataclasses.fields(self.fresnel))
+        if name == "ks":
+            fresnel = _fields(self.parts["fresnel"]) if "fresnel" in self.parts else ()
+            return not any(f.metadata["param"].per_channel for f in fresnel)
         return self.defaults()[name][0].per_channel
+
+    @property
+    def has_masking(self) -> bool:
+        """Whether its shadowing can be chosen."""
+        return any(f.name == "masking" for f in _fields(self.shape))
+
+
+def _fields(cls: Any) -> tuple[dataclasses.Field, ...]:
+    return dataclasses.fields(cls)
+
+
+def _microfacet() -> dict[str, Lobe]:
+    return {
+        normals.label + rough.suffix + fresnel.suffix: Lobe(
+            Microfacet, "microfacet", {"roughness": rough, "fresnel": fresnel, "distribution": normals}
+        )
+        for normals in (GGX, Beckmann)
+        for rough in (Isotropic, Anisotropic)
+        for fresnel in FRESNELS
+    }
+
+
+def _kulla_conty() -> dict[str, Lobe]:
+    return {
+        normals.label + "-kc" + fresnel.suffix: Lobe(
+            KullaConty, "microfacet", {"roughness": Isotropic, "fresnel": fresnel, "distribution": normals}
+        )
+        for normals in (GGX, Beckmann)
+        for fresnel in FRESNELS
+    }
+
+
+def _walter(distribution: type[eqx.Module]) -> Lobe:
+    return Lobe(Walter, "microfacet", {"roughness": Isotropic, "fresnel": Dielectric, "distribution": distribution})
 
 
 LOBES: dict[str, Lobe] = {
-    "lambert": Lobe(Lambert),
-    "phong": Lobe(Phong),
-    "blinn-phong": Lobe(BlinnPhong),
-    "blinn-phong-exact": Lobe(BlinnPhongExact),
-    **{"cook-torrance" + f.suffix: Lobe(CookTorrance, f) for f in (Dielectric, Schlick, Conductor)},
-    **{"ggx" + f.suffix: Lobe(Microfacet, f, GGX) for f in (Dielectric, Schlick, Conductor)},
-    **{"beckmann" + f.suffix: Lobe(Microfacet, f, Beckmann) for f in (Dielectric, Schlick, Conductor)},
+    "lambert": Lobe(Lambert, "diffuse"),
+    "phong": Lobe(Phong, "empirical"),
+    "blinn-phong": Lobe(BlinnPhong, "empirical"),
+    "blinn-phong-exact": Lobe(BlinnPhongExact, "empirical"),
+    **{
+        "cook-torrance" + f.suffix: Lobe(CookTorrance, "microfacet", {"roughness": Isotropic, "fresnel": f})
+        for f in FRESNELS
+    },
+    "walter-ggx": _walter(GGX),
+    "walter-beckmann": _walter(BeckmannRational),
+    **_microfacet(),
+    **_kulla_conty(),
+    "plastic": Lobe(Plastic, "microfacet"),
+    "varnish": Lobe(Varnish, "cover", {"coat": SmoothCoat}),
+    "rough-varnish": Lobe(Varnish, "cover", {"coat": RoughCoat}),
+    "tilt": Lobe(Tilted, "cover"),
 }
 
 
 def lobe_names(name: str) -> list[str]:
-    """The lobes of a model name.
+    """The lobes of a model name, covers first.
 
     Raises:
         ModelError: a lobe is unknown; the message lists the known ones.
     """
-    parts = [part.strip().lower() for part in name.split("+")]
-    for part in parts:
+    covers, base = _parsed(name)
+    return covers + base
+
+
+def normalised(name: str) -> str:
+    """The name as a model calls itself: lower case, no spaces.
+
+    Raises:
+        ModelError: as `lobe_names`.
+    """
+    covers, base = _parsed(name)
+    return OVER.join([*covers, "+".join(base)])
+
+
+def _parsed(name: str) -> tuple[list[str], list[str]]:
+    """Covers, outermost first, and the lobes of the base."""
+    *covers, base = "".join(name.split()).lower().split(OVER)
+    parts = base.split("+")
+    known = {kind: [n for n, lobe in LOBES.items() if (lobe.kind == "cover") is kind] for kind in (True, False)}
+    for part in covers + parts:
         if part not in LOBES:
             raise ModelError(f"model {name!r}: no lobe {part!r}; known lobes are {', '.join(LOBES)}.")
-    if len(set(parts)) != len(parts):
+    for part in covers:
+        if part not in known[True]:
+            raise ModelError(f"model {name!r}: {part} cannot stand over a base; {', '.join(known[True])} can.")
+    for part in parts:
+        if part not in known[False]:
+            raise ModelError(f"model {name!r}: {part} needs a base, for example {part}{OVER}lambert.")
+    if len(set(covers + parts)) != len(covers + parts):
         raise ModelError(f"model {name!r}: the same lobe twice cannot be told apart; use each once.")
-    return parts
+    return covers, parts
 
 
 def model(name: str, *, masking: str | None = None, channels: int | None = None, **values: ArrayLike) -> AbstractBRDF:
     """Build a model from its name.
 
     Args:
-        name: A lobe or a sum of lobes, "lambert+ggx"; `fitmat models` lists the lobes.
+        name: A lobe or a sum of lobes, "lambert+ggx", under a coat, "varnish-over-lambert+ggx", or on a sample that
+            may be tilted, "tilt-over-lambert+ggx"; `fitmat models` lists the lobes.
         masking: "correlated", "separable" or "v-cavity" for the microfacet lobes; None keeps each lobe's own.
         channels: Give per-channel parameters this many values; None keeps what is passed.
-        **values: Parameters by name (a name that two lobes share needs a tuple-free sum); the rest take defaults.
+        **values: Parameters by name; the rest take defaults. A name that two lobes share means both, or one of them
+            as `**{"ggx.ks": 0.5}`.
 
     Returns:
         A frozen module; call it through `fitmat.evaluate`.
@@ -94,37 +181,47 @@ def model(name: str, *, masking: str | None = None, channels: int | None = None,
         >>> fm.model("lambert+ggx", kd=0.3, alpha=0.2, eta=1.5).name
         'lambert+ggx'
     """
-    parts = lobe_names(name)
-    known = {key for part in parts for key in LOBES[part].defaults()}
+    covers, parts = _parsed(name)
+    lobes = covers + parts
+    known = {key for part in lobes for key in LOBES[part].defaults()}
+    dotted = {f"{part}.{key}" for part in lobes for key in LOBES[part].defaults()}
     for key in values:
-        if key not in known:
+        if key not in known | dotted:
             raise ModelError(f"model {name!r} has no parameter {key!r}; it has {', '.join(sorted(known))}.")
     if masking is not None and masking not in MASKINGS:
         raise ModelError(f"masking {masking!r}: expected one of {', '.join(MASKINGS)}.")
-    if masking is not None and not any(LOBES[part].fresnel for part in parts):
+    if masking is not None and not any(LOBES[part].has_masking for part in lobes):
         raise ModelError(f"model {name!r} has no masking to choose; leave out masking.")
-    lobes = tuple(_lobe(LOBES[part], masking, channels, values) for part in parts)
-    built = lobes[0] if len(lobes) == 1 else Sum(lobes)
+    made = tuple(_lobe(part, masking, channels, values) for part in parts)
+    built = made[0] if len(made) == 1 else Sum(made)
+    for cover in reversed(covers):
+        built = _lobe(cover, masking, channels, values, base=built)
     check_range(built)
     return built
 
 
-def _lobe(lobe: Lobe, masking: str | None, channels: int | None, values: dict[str, ArrayLike]) -> AbstractBRDF:
-    numbers = {}
-    for key, (_, default) in lobe.defaults().items():
-        value = as_parameter(values.get(key, default))
-        if channels is not None and lobe.per_channel(key):
-            if value.size not in (1, channels):
-                raise ModelError(f"parameter {key} has {value.size} values: expected 1 or {channels}, one a channel.")
-            value = np.broadcast_to(np.ravel(value), (channels,))
-        elif channels is not None and value.size != 1:
-            raise ModelError(f"parameter {key} has {value.size} values: expected 1, it is shared by all channels.")
-        numbers[key] = value
-    if lobe.fresnel is None:
-        return lobe.shape(**numbers)
-    own = {f.name for f in dataclasses.fields(lobe.fresnel)}
-    static: dict[str, Any] = {} if masking is None else {"masking": masking}
-    if lobe.distribution is not None:
-        static["distribution"] = lobe.distribution()
-    fresnel = lobe.fresnel(**{k: v for k, v in numbers.items() if k in own})
-    return lobe.shape(fresnel=fresnel, **static, **{k: v for k, v in numbers.items() if k not in own})
+def _lobe(
+    name: str, masking: str | None, channels: int | None, values: dict[str, ArrayLike], **inner: Any
+) -> AbstractBRDF:
+    """The lobe of that name; `inner` holds the base of a cover."""
+    lobe = LOBES[name]
+    numbers = {
+        key: _number(key, values.get(f"{name}.{key}", values.get(key, default)), channels, lobe.per_channel(key))
+        for key, (_, default) in lobe.defaults().items()
+    }
+    for field, part in lobe.parts.items():
+        inner[field] = part(**{f.name: numbers.pop(f.name) for f in _fields(part) if f.name in numbers})
+    if masking is not None and lobe.has_masking:
+        inner["masking"] = masking
+    return lobe.shape(**numbers, **inner)
+
+
+def _number(key: str, given: ArrayLike, channels: int | None, per_channel: bool) -> Any:
+    value = as_parameter(given)
+    if channels is not None and per_channel:
+        if value.size not in (1, channels):
+            raise ModelError(f"parameter {key} has {value.size} values: expected 1 or {channels}, one a channel.")
+        return np.broadcast_to(np.ravel(value), (channels,))
+    if channels is not None and value.size != 1:
+        raise ModelError(f"parameter {key} has {value.size} values: expected 1, it is shared by all channels.")
+    return value

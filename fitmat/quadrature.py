@@ -1,0 +1,170 @@
+"""Rules that integrate over directions, dense where a mirror-like lobe is, and curves tabulated against a cosine.
+
+Knows no model.
+"""
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from fitmat._types import Directions, Scalar, Vec3
+from fitmat.geometry import rotated
+
+ZENITH_NODES = 64
+AZIMUTH_NODES = 32
+INCIDENCE_NODES = 16
+CURVE_NODES = 24
+
+_SPREAD = 0.5
+# The rule is densest within this fraction of a lobe's width.
+
+
+class Rule(eqx.Module):
+    """Directions and weights: Σ weight·g(wo) ≈ ∫ g(ω_o) c_o dω_o over the upper hemisphere, for one incidence.
+
+    Attributes:
+        wi: The incidence.
+        wo: Directions, (m, 3).
+        weight: Weights with the cosine c_o and the solid angle, (m,); 0 below the horizon.
+    """
+
+    wi: Vec3
+    wo: Directions
+    weight: Float[Array, " m"]
+
+
+class Facets(eqx.Module):
+    """Micro-normals that face ω_i, and solid angles: Σ solid·g(h) ≈ ∫ g(h) dω_h over them.
+
+    Attributes:
+        wi: The direction they face.
+        h: Directions, (m, 3).
+        solid: Solid angles in sr, (m,).
+    """
+
+    wi: Vec3
+    h: Directions
+    solid: Float[Array, " m"]
+
+
+def incidence(theta_i: Scalar) -> Vec3:
+    """The unit vector to the light at zenith angle theta_i (radians), azimuth 0."""
+    return jnp.stack([jnp.sin(theta_i), 0.0 * theta_i, jnp.cos(theta_i)])
+
+
+def facets(
+    theta_i: Scalar,
+    width: Scalar,
+    *,
+    phi_i: Scalar | None = None,
+    nodes: tuple[int, int] = (ZENITH_NODES, AZIMUTH_NODES),
+) -> Facets:
+    """A product rule over the micro-normals that face the light, dense around n on the scale of `width`.
+
+    Gauss–Legendre in t with θ_h = w sinh(t asinh(π/(2w))), and in φ_h as far as ω_i·h > 0. The rule is constant
+    under differentiation: the slope of an integral is the integral of the slope.
+
+    Args:
+        theta_i: Incidence in radians.
+        width: Slope-like width of the narrowest lobe.
+        phi_i: Azimuth of incidence in radians; None for integrands that are the same on both sides of the plane of
+            incidence: then the light comes from azimuth 0 and one side is taken, doubled.
+        nodes: How many in zenith, and in azimuth on each side.
+    """
+    x, weights = np.polynomial.legendre.leggauss(nodes[0])
+    t, scale = jnp.asarray((x + 1) / 2), _SPREAD * width
+    reach = jnp.arcsinh(jnp.pi / 2 / scale)
+    theta_h = (scale * jnp.sinh(t * reach))[:, None]
+    d_theta = (weights / 2 * scale * jnp.cosh(t * reach) * reach)[:, None]
+    y, ring = np.polynomial.legendre.leggauss(nodes[1] if phi_i is None else 2 * nodes[1])
+    edge = jnp.arccos(jnp.clip(-jnp.cos(theta_i) / jnp.maximum(jnp.sin(theta_i) * jnp.tan(theta_h), 1e-300), -1, 1))
+    phi = edge * jnp.asarray((y + 1) / 2 if phi_i is None else y)
+    solid = d_theta * jnp.sin(theta_h) * edge * jnp.asarray(ring)
+    wi = incidence(theta_i)
+    h = jnp.stack([jnp.sin(theta_h) * jnp.cos(phi), jnp.sin(theta_h) * jnp.sin(phi), jnp.cos(theta_h) + 0.0 * phi])
+    if phi_i is not None:
+        wi, h = rotated(wi, phi_i), rotated(h, phi_i)
+    return jax.lax.stop_gradient(Facets(wi, h.reshape(3, -1).T, solid.ravel()))
+
+
+def reflected(normals: Facets) -> Rule:
+    """The rule over outgoing directions that mirror ω_i at the normals: dω_o = 4 (ω_i·h) dω_h (Walter 2007, eq. 14)."""
+    wi = normals.wi
+    cos_d = normals.h @ wi
+    wo = 2.0 * cos_d[:, None] * normals.h - wi
+    weight = jnp.where((cos_d > 0) & (wo[:, 2] > 0), 4.0 * cos_d * normals.solid * wo[:, 2], 0.0)
+    return Rule(wi, wo, weight)
+
+
+def lobe_rule(
+    theta_i: Scalar,
+    width: Scalar,
+    *,
+    phi_i: Scalar | None = None,
+    nodes: tuple[int, int] = (ZENITH_NODES, AZIMUTH_NODES),
+) -> Rule:
+    """A rule over ω_o that resolves lobes of a given width around the mirror direction; arguments as in `facets`."""
+    return reflected(facets(theta_i, width, phi_i=phi_i, nodes=nodes))
+
+
+def incidence_rule() -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
+    """Incidence angles (radians) and weights of ∫ g(θ_i) c_i dω_i over the hemisphere: Gauss in cosθ_i.
+
+    Divided by cosθ_i the weights integrate over solid angle.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(INCIDENCE_NODES)
+    cos = (nodes + 1) / 2
+    return np.arccos(cos), np.pi * weights * cos
+
+
+class Curve(eqx.Module):
+    """A smooth function of a cosine, known at `CURVE_NODES` nodes: a polynomial in √c.
+
+    Attributes:
+        coefficients: Of Chebyshev polynomials in 2√c − 1, (k,).
+    """
+
+    coefficients: Float[Array, " k"]
+
+    def __call__(self, cos: Scalar) -> Scalar:
+        """The function at a cosine in [0, 1], by Clenshaw's recurrence."""
+        x = 2.0 * jnp.sqrt(jnp.maximum(cos, _ROOT_FLOOR)) - 1.0
+        one, two = jnp.zeros_like(x), jnp.zeros_like(x)
+        for k in range(CURVE_NODES - 1, 0, -1):
+            one, two = self.coefficients[k] + 2.0 * x * one - two, one
+        return self.coefficients[0] + x * one - two
+
+
+def curve(function: Callable[[Scalar], Scalar]) -> Curve:
+    """Tabulate a function of a cosine; traceable, so that its parameters can be fitted."""
+    return Curve(jnp.asarray(_TO_COEFFICIENTS) @ jax.vmap(function)(jnp.asarray(_NODES)))
+
+
+_ROOT_FLOOR = 1e-8
+# √c has no finite slope at 0.
+
+
+def cosine_mean(function: Callable[[Scalar], Scalar]) -> Scalar:
+    """2 ∫₀¹ f(c) c dc, the average over a hemisphere that is lit evenly; Gauss in √c."""
+    return jnp.asarray(_SHARES) @ jax.vmap(function)(jnp.asarray(_COSINES))
+
+
+def _chebyshev() -> tuple[np.ndarray, np.ndarray]:
+    """Nodes in c, and the matrix from values at them to Chebyshev coefficients."""
+    x = np.polynomial.chebyshev.chebpts1(CURVE_NODES)
+    return ((x + 1) / 2) ** 2, np.linalg.inv(np.polynomial.chebyshev.chebvander(x, CURVE_NODES - 1))
+
+
+def _gauss() -> tuple[np.ndarray, np.ndarray]:
+    """Cosines and shares of `cosine_mean`: c = x², 2c dc = 4x³ dx."""
+    x, weights = np.polynomial.legendre.leggauss(2 * CURVE_NODES)
+    root = (x + 1) / 2
+    return root**2, 2.0 * root**3 * weights
+
+
+_NODES, _TO_COEFFICIENTS = _chebyshev()
+_COSINES, _SHARES = _gauss()
