@@ -11,10 +11,11 @@ import sys
 import warnings
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
+from fitmat import options
 from fitmat.errors import FitmatError
 
 DEFAULT_MODELS = "lambert+blinn-phong,lambert+ggx"
@@ -50,99 +51,51 @@ def _setup() -> None:
 
 @app.command(
     epilog="Columns, by name: theta_i, theta_o and phi (or phi_i and phi_o, or a signed theta_o alone) in degrees; "
-    "brdf, brdf_cos or reflectance_factor; brdf_r, brdf_g, brdf_b or brdf_550 for channels; sigma where the noise is "
-    "known.\n\n"
+    "brdf, brdf_cos, reflectance_factor or radiance; brdf_r, brdf_g, brdf_b or brdf_550 for channels; sigma where the "
+    "noise is known.\n\n"
     "Written to --out: report.html (tables and pictures), fit.json (the same numbers), posterior-MODEL.nc (draws of "
     "the parameters, for ArviZ). Ctrl-C during sampling keeps what is done and still writes them.\n\n"
     "Examples:\n\n"
     "  fitmat fit measurements.csv\n\n"
     "  fitmat fit measurements.csv --models lambert+ggx --fix ks=1 --out run1\n\n"
+    "  fitmat fit gold.csv --models ggx --ior Au --fix ks=1\n\n"
     "  fitmat fit scan.txt --columns theta_i=AOI,brdf=4 --no-mcmc"
 )
 def fit(
-    file: Annotated[Path, typer.Argument(help="Measurements: CSV or any text table, one row per pair of directions.")],
-    models: Annotated[
-        str,
-        typer.Option(
-            help="Models to fit, separated by commas; see [bold]fitmat models[/bold]. An empirical and a microfacet "
-            "model are compared. Default: lambert+blinn-phong and lambert+ggx.",
-            metavar="NAMES",
-            show_default=False,
-        ),
-    ] = DEFAULT_MODELS,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="Folder for the report; default NAME-fitmat (then -2, -3, …) beside the input.",
-            metavar="DIR",
-            show_default=False,
-        ),
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the report of an earlier run in --out.")] = False,
-    json_: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")] = False,
-    no_mcmc: Annotated[
-        bool, typer.Option("--no-mcmc", help="Skip sampling: faster, intervals from Laplace's approximation.")
-    ] = False,
-    seed: Annotated[
-        int, typer.Option(min=0, help="Seed of the sampling; the same seed, the same report.", metavar="N")
-    ] = 0,
-    fix: Annotated[
-        list[str] | None,
-        typer.Option(help="Hold a parameter, e.g. ks=1; repeat for more.", metavar="NAME=VALUE", show_default=False),
-    ] = None,
-    masking: Annotated[
-        str | None,
-        typer.Option(
-            help="Shadowing of microfacet lobes: correlated (default), separable or v-cavity.",
-            metavar="KIND",
-            show_default=False,
-        ),
-    ] = None,
-    columns: Annotated[
-        str | None,
-        typer.Option(
-            help="Which column is what, where the header has other names: theta_i=Zenith,brdf=3 (a name in the "
-            "header, or a column number from 1).",
-            metavar="OURS=THEIRS",
-            show_default=False,
-        ),
-    ] = None,
-    quantity: Annotated[
-        str | None,
-        typer.Option(
-            help="What a column called 'value' holds: brdf (sr⁻¹), brdf_cos or reflectance_factor.",
-            metavar="KIND",
-            show_default=False,
-        ),
-    ] = None,
-    angle_unit: Annotated[
-        str | None,
-        typer.Option(help="Unit of the angles: degrees (default) or radians.", metavar="UNIT", show_default=False),
-    ] = None,
-    forward: Annotated[
-        str,
-        typer.Option(
-            help="Sign of theta_o on the mirror side, in files without azimuth: positive or negative.", metavar="SIGN"
-        ),
-    ] = "positive",
-    specular_azimuth: Annotated[
-        int, typer.Option(help="Relative azimuth phi of the mirror side in the file: 180 or 0.", metavar="PHI")
-    ] = 180,
+    file: options.File,
+    models: options.Models = DEFAULT_MODELS,
+    out: options.Out = None,
+    force: options.Force = False,
+    json_: options.Json = False,
+    no_mcmc: options.NoMcmc = False,
+    seed: options.Seed = 0,
+    fix: options.Fix = None,
+    masking: options.Masking = None,
+    columns: options.Columns = None,
+    quantity: options.Quantity = None,
+    angle_unit: options.AngleUnit = None,
+    forward: options.Forward = "positive",
+    specular_azimuth: options.SpecularAzimuth = 180,
+    intensity: options.Intensity = None,
+    distance: options.Distance = None,
+    ior: options.Ior = None,
+    tilt: options.Tilt = False,
 ) -> None:
     """Fit models to a file of measurements and write a report with the Phong–microfacet match."""
     _setup()
-    from fitmat import console, folder, report
+    from fitmat import conditions, console, folder, report
     from fitmat.formats import read
     from fitmat.params import assignments
 
-    reading: dict[str, Any] = {"columns": columns, "quantity": quantity, "angle_unit": angle_unit}
+    reading: dict[str, Any] = {"columns": columns, "quantity": quantity, "angle_unit": angle_unit, "forward": forward}
     names, fixed = console.model_names(models), assignments(fix or [], "--fix")
-    measurements = read(file, **reading, forward=forward, specular_azimuth=specular_azimuth)
+    measurements = read(file, **reading, specular_azimuth=specular_azimuth, intensity=intensity, distance=distance)
+    known = conditions.prepared(names, measurements, ior=ior, tilt=tilt)
     target = out or folder.default(file)
     with folder.new(target, force=force, stale=report.POSTERIOR.format("*")) as draft:
         _leave_on_interrupt(draft)
         posteriors, match = console.study(
-            measurements, names, fixed=fixed, masking=masking, sampling=not no_mcmc, seed=seed
+            measurements, known, fixed=fixed, masking=masking, sampling=not no_mcmc, seed=seed
         )
         report.write(draft, posteriors, match)
     if json_:
@@ -159,45 +112,19 @@ def fit(
     "  fitmat simulate lambert+ggx --set kd=0.3 --set alpha=0.2 --out plastic.csv"
 )
 def simulate(
-    model: Annotated[str | None, typer.Argument(help="True model, e.g. lambert+ggx.", show_default=False)] = None,
-    out: Annotated[Path, typer.Option(help="CSV file to write.")] = Path("simulated.csv"),
-    set_: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            help="A true parameter, e.g. alpha=0.2, or kd=0.4,0.1,0.1 for three channels; repeat for more.",
-            metavar="NAME=VALUE",
-            show_default=False,
-        ),
-    ] = None,
-    theta_i: Annotated[
-        str, typer.Option(help="Incidence angles in degrees, as --theta-o.", metavar="ANGLES")
-    ] = "10,30,45,60,75",
-    theta_o: Annotated[
-        str,
-        typer.Option(
-            help="Outgoing angles in degrees, FIRST:LAST:STEP or a list A,B,C; positive = mirror side.",
-            metavar="ANGLES",
-        ),
-    ] = "-80:80:2",
-    noise: Annotated[
-        float, typer.Option(min=0, help="Relative noise, as a fraction of the true value.", metavar="X")
-    ] = 0.02,
-    floor: Annotated[float, typer.Option(min=0, help="Absolute noise in sr⁻¹.", metavar="X")] = 1e-3,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.", metavar="N")] = 0,
-    masking: Annotated[
-        str | None,
-        typer.Option(
-            help="Shadowing of microfacet lobes: correlated (default), separable or v-cavity.",
-            metavar="KIND",
-            show_default=False,
-        ),
-    ] = None,
-    catalogue: Annotated[
-        Path | None,
-        typer.Option(help="Write the catalogue of synthetic materials into this folder instead.", show_default=False),
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
+    model: options.Model = None,
+    out: options.SimulatedOut = Path("simulated.csv"),
+    set_: options.Set = None,
+    theta_i: options.ThetaI = "10,30,45,60,75",
+    theta_o: options.ThetaO = "-80:80:2",
+    phi: options.Phi = "180",
+    phi_i: options.PhiI = "0",
+    noise: options.Noise = 0.02,
+    floor: options.Floor = 1e-3,
+    seed: options.SimulatedSeed = 0,
+    masking: options.Masking = None,
+    catalogue: options.Catalogue = None,
+    force: options.SimulatedForce = False,
 ) -> None:
     """Simulate measurements of a known material, to test an instrument's plan or fitmat itself."""
     _setup()
@@ -206,7 +133,12 @@ def simulate(
     if catalogue is not None:
         written = simulation.write_catalogue(catalogue, force=force)
     else:
-        angles = simulation.angles(theta_i, "--theta-i", lowest=0.0), simulation.angles(theta_o, "--theta-o")
+        angles = (
+            simulation.angles(theta_i, "--theta-i", lowest=0.0),
+            simulation.angles(theta_o, "--theta-o"),
+            simulation.angles(phi, "--phi", lowest=0.0, highest=360.0),
+            simulation.angles(phi_i, "--phi-i", lowest=0.0, highest=360.0),
+        )
         truth = simulation.truth(model, set_ or [], masking)
         written = simulation.write_simulation(out, truth, angles, noise=(noise, floor, seed), force=force)
     typer.echo("\n".join(str(path) for path in written))
@@ -214,15 +146,20 @@ def simulate(
 
 @app.command()
 def models(
-    name: Annotated[str | None, typer.Argument(help="A lobe or model, e.g. ggx or lambert+ggx.")] = None,
+    name: options.Name = None,
+    check: options.Check = False,
 ) -> None:
-    """List the models, or print the manual page of one: formula, parameters, limits, reference."""
-    from fitmat import console
+    """List the models, or print the manual page of one: formula, parameters, limits, reference, laws."""
+    from fitmat import manual
 
-    if name is None:
-        console.list_models()
+    if check:
+        _setup()
+        if surprises := manual.check():
+            _end(f"{', '.join(surprises)} break a law that their manual pages do not mention.")
+    elif name is None:
+        manual.list_models()
     else:
-        console.manual(name)
+        manual.page(name)
 
 
 def main() -> None:

@@ -4,7 +4,6 @@ Progress goes to stderr, results to stdout; nothing is computed here.
 """
 
 import contextlib
-import inspect
 import signal
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -18,7 +17,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn
 from rich.table import Table
 from rich.text import Text
 
-from fitmat.brdf import LOBES, lobe_names, model
+from fitmat.brdf import LOBES, lobe_names, model, normalised
 from fitmat.comparison import Comparison, compare, is_empirical, is_microfacet
 from fitmat.errors import ModelError
 from fitmat.measurement import Measurements
@@ -31,7 +30,7 @@ from fitmat.uncertainty import laplace_each, sample
 
 def model_names(text: str) -> list[str]:
     """A comma-separated list of model names, checked, without repeats."""
-    names = ["+".join(lobe_names(part)) for part in text.split(",") if part.strip()]
+    names = [normalised(part) for part in text.split(",") if part.strip()]
     if not names:
         raise ModelError("no model given; try --models lambert+blinn-phong,lambert+ggx.")
     return list(dict.fromkeys(names))
@@ -39,7 +38,7 @@ def model_names(text: str) -> list[str]:
 
 def study(
     measurements: Measurements,
-    names: Sequence[str],
+    known: Mapping[str, Mapping[str, np.ndarray]],
     *,
     fixed: Mapping[str, np.ndarray],
     masking: str | None,
@@ -48,14 +47,22 @@ def study(
 ) -> tuple[list[Posterior], Comparison | None]:
     """Fit, sample and compare, with a progress bar on stderr.
 
-    A fixed parameter or a masking applies to every model that has it; at least one must. An interrupt during sampling
-    keeps what was done and leaves the remaining models to Laplace's approximation.
+    Args:
+        measurements: What to fit.
+        known: Model name → parameters that are known of it beforehand (`conditions.prepared`).
+        fixed: Parameters to hold in every model that has them; at least one must.
+        masking: The same for the masking.
+        sampling: Whether to sample; else Laplace's approximation.
+        seed: Of the sampling.
+
+    An interrupt during sampling keeps what was done and leaves the remaining models to Laplace's approximation.
     """
+    names = list(known)
     screen = Console(stderr=True)
     parts = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*parts, console=screen, transient=True, disable=not screen.is_terminal) as bar:
         fitting = bar.add_task(f"fitting {', '.join(names)}", total=None)
-        jobs = {name: _options(name, names, fixed, masking) for name in names}
+        jobs = {name: _options(name, known, fixed, masking) for name in names}
         first = laplace_each(measurements, jobs, seed=seed)
         bar.update(fitting, total=1, completed=1)
         with ThreadPoolExecutor(1) as pool:
@@ -101,17 +108,23 @@ def _interrupt_later() -> Iterator[list[int]]:
         signal.signal(signal.SIGINT, before)
 
 
-def _options(name: str, names: Sequence[str], fixed: Mapping[str, np.ndarray], masking: str | None) -> dict[str, Any]:
-    """What of --fix and --masking concerns this model; refuses what concerns none."""
-    known = {n: {e.name for e in entries(model(n))} for n in names}
+def _options(
+    name: str,
+    known: Mapping[str, Mapping[str, np.ndarray]],
+    fixed: Mapping[str, np.ndarray],
+    masking: str | None,
+) -> dict[str, Any]:
+    """What is known of this model, and what of --fix and --masking concerns it; refuses what concerns none."""
+    names, having = list(known), {n: {e.name for e in entries(model(n))} for n in known}
     for key in fixed:
-        if not any(key in has for has in known.values()):
-            every = ", ".join(sorted(set().union(*known.values())))
+        if not any(key in has for has in having.values()):
+            every = ", ".join(sorted(set().union(*having.values())))
             raise ModelError(f"--fix {key}: no model of {', '.join(names)} has it; they have {every}.")
-    chosen: dict[str, Any] = {"fixed": {k: v for k, v in fixed.items() if k in known[name]}}
-    if masking is not None and is_microfacet(name):
+    chosen: dict[str, Any] = {"fixed": {**known[name], **{k: v for k, v in fixed.items() if k in having[name]}}}
+    choosing = [n for n in names if any(LOBES[part].has_masking for part in lobe_names(n))]
+    if masking is not None and name in choosing:
         chosen["masking"] = masking
-    elif masking is not None and not any(is_microfacet(n) for n in names):
+    elif masking is not None and not choosing:
         raise ModelError(f"--masking {masking}: none of {', '.join(names)} has a masking to choose.")
     return chosen
 
@@ -160,42 +173,3 @@ def _table(posterior: Posterior) -> Table:
         remark = " ".join(part for part in (row["unit"], row["remark"].removesuffix(" by these angles")) if part)
         table.add_row(*(Text(cell) for cell in (name, row["symbol"], row["value"], row["interval"], remark)))
     return table
-
-
-def list_models() -> None:
-    """Print every lobe with its parameters and the first line of its manual page, or what sets a variant apart."""
-    table = Table(box=None, pad_edge=False)
-    for heading in ("lobe", "parameters", "what it is"):
-        table.add_column(heading, no_wrap=heading == "lobe")
-    for name, lobe in LOBES.items():
-        words = _first_line(lobe.shape)
-        if lobe.fresnel is not None and lobe.fresnel.suffix:
-            words = f"{name.removesuffix(lobe.fresnel.suffix)} with another Fresnel term. {_first_line(lobe.fresnel)}"
-        table.add_row(name, ", ".join(lobe.defaults()), Text(words))
-    out = Console()
-    out.print(table)
-    out.print(
-        "\nA model is a sum of lobes: lambert+ggx. 'fitmat models ggx' prints the manual page of a lobe.",
-        highlight=False,
-    )
-
-
-def _first_line(documented: object) -> str:
-    return (inspect.getdoc(documented) or "").split("\n", 1)[0]
-
-
-def manual(name: str) -> None:
-    """Print the manual page of every lobe of a model, and its parameters."""
-    out = Console()
-    for part in lobe_names(name):
-        lobe = LOBES[part]
-        out.print(f"[bold]{part}[/bold]\n")
-        for paragraph in inspect.cleandoc(lobe.shape.__doc__ or "").split("\n\n"):
-            out.print(" ".join(paragraph.split()) + "\n", markup=False, highlight=False)
-        table = Table(box=None, pad_edge=False)
-        for heading in ("parameter", "symbol", "range", "default", "channels", "meaning"):
-            table.add_column(heading)
-        for key, (p, default) in lobe.defaults().items():
-            spread = "one each" if lobe.per_channel(key) else "shared"
-            table.add_row(key, p.symbol, f"{p.lower:g} – {p.upper:g}", f"{default:g}", spread, p.doc)
-        out.print(table)

@@ -1,4 +1,4 @@
-"""A folder of results: its default name, and how it appears, complete or not at all.
+"""Results on disk: a folder or a file appears complete or not at all, and never over something unasked.
 
 Knows nothing of what is in it.
 """
@@ -63,3 +63,26 @@ def _move(draft: Path, target: Path, stale: str) -> None:
 
 def _reason(error: OSError) -> str:
     return error.strerror or str(error)
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a file in one stroke: a reader sees the old content or the whole new one.
+
+    Args:
+        path: The file; its folder is made where it does not exist.
+        text: Written as UTF-8 with newlines as they are.
+
+    Returns:
+        The path.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        draft = path.with_name(f"{path.name}.part")
+        draft.write_text(text, encoding="utf-8", newline="\n")
+        draft.replace(path)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written ({error.strerror}); choose another place.") from error
+    return path

@@ -64,6 +64,11 @@ class Measurements:
         return zenith(self.wi)
 
     @property
+    def phi_i(self) -> Float[np.ndarray, " n"]:
+        """Azimuth of incidence in radians, [0, 2π); 0 for light along the normal."""
+        return np.where(self.theta_i < IN_PLANE, 0.0, np.arctan2(self.wi[:, 1], self.wi[:, 0]) % (2 * np.pi))
+
+    @property
     def theta_o(self) -> Float[np.ndarray, " n"]:
         """Zenith angle of reflection in radians, 0 to π/2."""
         return zenith(self.wo)
@@ -113,6 +118,7 @@ def from_arrays(
     value: ArrayLike,
     *,
     phi: ArrayLike = np.pi,
+    phi_i: ArrayLike = 0.0,
     sigma: ArrayLike | None = None,
     channels: tuple[str, ...] | None = None,
     source: str = "array",
@@ -124,6 +130,7 @@ def from_arrays(
         theta_o: Zenith angles of reflection, (n,); with the default phi, positive = mirror side.
         value: BRDF, (n,) or (n, c).
         phi: Relative azimuth φ_o − φ_i, (n,) or one number; π is the mirror side.
+        phi_i: Azimuth of incidence, (n,) or one number; of consequence for anisotropic and tilted samples only.
         sigma: Standard deviation of the noise, shape of `value`.
         channels: Names of the c columns.
         source: Title for messages.
@@ -135,17 +142,18 @@ def from_arrays(
         >>> from_arrays([0.5, 0.5], [-0.5, 0.5], [0.1, 0.3]).n_samples
         2
     """
-    theta_i, theta_o, phi = np.broadcast_arrays(*(np.asarray(a, float) for a in (theta_i, theta_o, phi)))
+    given = (np.asarray(a, float) for a in (theta_i, theta_o, phi, phi_i))
+    theta_i, theta_o, phi, phi_i = np.broadcast_arrays(*given)
     value = np.atleast_2d(np.asarray(value, float).T).T
     if theta_i.ndim != 1 or len(value) != len(theta_i):
         raise ReadError(f"{source}: {len(value)} values for angles of shape {theta_i.shape}: expected (n,) each.")
     if sigma is not None:
         sigma = np.broadcast_to(np.atleast_2d(np.asarray(sigma, float).T).T, value.shape)
     channels = channels or default_channels(value.shape[1])
-    placed = np.isfinite(theta_i) & np.isfinite(theta_o) & np.isfinite(phi)
-    theta_i, theta_o, phi = (np.where(placed, angle, 0.0) for angle in (theta_i, theta_o, phi))
-    phi = np.where(theta_o < 0, phi + np.pi, phi)
-    wi, wo = from_angles(theta_i, np.zeros_like(phi)), from_angles(np.abs(theta_o), phi)
+    placed = np.isfinite(theta_i) & np.isfinite(theta_o) & np.isfinite(phi) & np.isfinite(phi_i)
+    theta_i, theta_o, phi, phi_i = (np.where(placed, angle, 0.0) for angle in (theta_i, theta_o, phi, phi_i))
+    phi_o = phi_i + phi + np.where(theta_o < 0, np.pi, 0.0)
+    wi, wo = from_angles(theta_i, phi_i), from_angles(np.abs(theta_o), phi_o)
     valid = np.isfinite(value) & (placed & (wi[:, 2] > 0) & (wo[:, 2] > 0))[:, None]
     if sigma is not None:
         valid = valid & np.isfinite(sigma) & (sigma > 0)

@@ -51,14 +51,15 @@ def plot_section(
     for posterior, colour in zip(posteriors, FIT_COLOURS, strict=False):
         low, high = predictive_band(posterior, rows)[:, :, channel]
         ax.fill_between(angle, low, high, color=colour, alpha=0.18, lw=0)
-        line = curve(posterior.fit, section.theta_i, np.deg2rad(fine))[:, channel]
+        line = curve(posterior.fit, section, np.deg2rad(fine))[:, channel]
         top = max(top, float(line.max()))
         ax.plot(fine, line, color=colour, lw=1.3, label=posterior.fit.name)
     ax.plot(angle, measured, ".", color=BLACK, ms=3.5, label="measured")
     _set_scale(ax, measured, top)
     ax.axvline(np.rad2deg(section.theta_i), color="0.75", lw=0.8, ls=":", zorder=0)
     ax.set(xlim=(-90, 90), xticks=[-60, -30, 0, 30, 60])
-    ax.set_title(f"incidence {np.rad2deg(section.theta_i):.4g}°", fontsize=9)
+    azimuth = f", azimuth {np.rad2deg(section.phi_i):.4g}°" if section.phi_i else ""
+    ax.set_title(f"incidence {np.rad2deg(section.theta_i):.4g}°{azimuth}", fontsize=9)
     ax.set_xlabel("θₒ / °  (positive = mirror side)", fontsize=8)
     ax.set_ylabel("BRDF / sr⁻¹", fontsize=8)
     ax.tick_params(labelsize=7)

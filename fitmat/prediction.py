@@ -25,38 +25,40 @@ BAND_DRAWS = 200
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Section:
-    """The in-plane samples of one incidence angle, sorted by signed theta_o.
+    """The in-plane samples of one direction of incidence, sorted by signed theta_o.
 
     Attributes:
         theta_i: Incidence, radians.
+        phi_i: Its azimuth, radians.
         rows: Indices into the measurements, (k,).
         theta_o: Signed, positive on the mirror side, radians, (k,).
     """
 
     theta_i: float
+    phi_i: float
     rows: np.ndarray
     theta_o: np.ndarray
 
 
 def sections(m: Measurements, most: int = 8) -> list[Section]:
     """In-plane curves with at least three valid samples, by incidence; `most` of them, evenly spread."""
-    usable = m.in_plane & m.valid.any(axis=1)
-    rounded = np.round(np.rad2deg(m.theta_i), 2)
+    usable = np.flatnonzero(m.in_plane & m.valid.any(axis=1))
+    light = np.round(np.rad2deg(np.stack([m.theta_i, m.phi_i], axis=1)[usable]), 2) % 360.0
     found = []
-    for angle in np.unique(rounded[usable]):
-        rows = np.flatnonzero(usable & (rounded == angle))
+    for theta_i, phi_i in np.unique(light, axis=0):
+        rows = usable[(light == [theta_i, phi_i]).all(axis=1)]
         if len(rows) >= 3:
             rows = rows[np.argsort(m.signed_theta_o[rows])]
-            found.append(Section(float(np.deg2rad(angle)), rows, m.signed_theta_o[rows]))
+            found.append(Section(np.deg2rad(theta_i), np.deg2rad(phi_i), rows, m.signed_theta_o[rows]))
     if len(found) <= most:
         return found
     return [found[k] for k in np.linspace(0, len(found) - 1, most).astype(int)]
 
 
-def curve(fit: Fit, theta_i: float, theta_o: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k c"]:
-    """The fitted BRDF in sr⁻¹ along an in-plane curve; signed theta_o, radians."""
-    wi = from_angles(np.full_like(theta_o, theta_i), np.zeros_like(theta_o))
-    wo = from_angles(np.abs(theta_o), np.where(theta_o >= 0, np.pi, 0.0))
+def curve(fit: Fit, section: Section, theta_o: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k c"]:
+    """The fitted BRDF in sr⁻¹ along the plane of a section; signed theta_o, radians."""
+    wi = from_angles(np.full_like(theta_o, section.theta_i), np.full_like(theta_o, section.phi_i))
+    wo = from_angles(np.abs(theta_o), section.phi_i + np.where(theta_o >= 0, np.pi, 0.0))
     return evaluate(fit.model, wi, wo)
 
 

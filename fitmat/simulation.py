@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fitmat import synthetic
+from fitmat import catalogue, synthetic
 from fitmat.brdf import AbstractBRDF, model
 from fitmat.errors import ModelError, OutputError
 from fitmat.params import assignments
@@ -17,16 +17,17 @@ MOST_ANGLES = 10_000
 """More angles than this on one axis are a slip of the keyboard."""
 
 
-def angles(text: str, option: str, *, lowest: float = -90.0) -> np.ndarray:
+def angles(text: str, option: str, *, lowest: float = -90.0, highest: float = 90.0) -> np.ndarray:
     """`FIRST:LAST:STEP` or a comma-separated list, in degrees.
 
     Args:
         text: What the user gave.
         option: Its name, for messages.
-        lowest: Smallest angle allowed, degrees.
+        lowest: Smallest angle allowed, degrees; −90 itself is not.
+        highest: The angles stay below it.
 
     Raises:
-        ModelError: the text is neither, there are too many angles, or one is outside `lowest` to 90.
+        ModelError: the text is neither, there are too many angles, or one is outside `lowest` to `highest`.
     """
     try:
         if ":" in text:
@@ -39,8 +40,10 @@ def angles(text: str, option: str, *, lowest: float = -90.0) -> np.ndarray:
         raise ModelError(f"{option} {text!r}: expected a list 10,30,60 or FIRST:LAST:STEP in degrees.") from error
     if found.size > MOST_ANGLES:
         raise ModelError(f"{option} {text!r}: expected at most {MOST_ANGLES} angles; take a larger step.")
-    if found.size == 0 or not ((found >= lowest) & (found > -90) & (found < 90)).all():
-        raise ModelError(f"{option} {text!r}: expected angles from {lowest:g} to below 90 degrees, in rising order.")
+    if found.size == 0 or not ((found >= lowest) & (found > -90) & (found < highest)).all():
+        raise ModelError(
+            f"{option} {text!r}: expected angles from {lowest:g} to below {highest:g} degrees, in rising order."
+        )
     return found
 
 
@@ -60,7 +63,7 @@ def truth(name: str | None, settings: Sequence[str], masking: str | None) -> Abs
 def write_simulation(
     path: Path,
     material: AbstractBRDF,
-    geometry: tuple[np.ndarray, np.ndarray],
+    geometry: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     *,
     noise: tuple[float, float, int],
     force: bool,
@@ -70,7 +73,7 @@ def write_simulation(
     Args:
         path: The file.
         material: The true model.
-        geometry: theta_i and signed theta_o in degrees; every pair is measured.
+        geometry: theta_i, signed theta_o, phi and phi_i in degrees; every combination is measured.
         noise: Relative noise, absolute noise in sr⁻¹, seed.
         force: Replace an existing file.
 
@@ -78,10 +81,11 @@ def write_simulation(
         OutputError: the file exists and `force` is off, or it cannot be written.
     """
     _refuse_existing([path], force)
-    theta_i, theta_o = (np.deg2rad(part) for part in geometry)
+    theta_i, theta_o, phi, phi_i = (np.deg2rad(part) for part in geometry)
     relative, absolute, seed = noise
+    azimuths = {"phi": phi, "phi_i": phi_i}
     measured = synthetic.simulate(
-        material, theta_i, theta_o, relative_noise=relative, absolute_noise=absolute, seed=seed
+        material, theta_i, theta_o, **azimuths, relative_noise=relative, absolute_noise=absolute, seed=seed
     )
     described = f"simulated {material.name}; noise {relative:g} relative + {absolute:g} sr^-1, seed {seed}"
     return (synthetic.write_csv(measured, path, [described]),)
@@ -93,8 +97,8 @@ def write_catalogue(folder: Path, *, force: bool) -> tuple[Path, ...]:
     Raises:
         OutputError: one of its files exists and `force` is off, or it cannot be written.
     """
-    _refuse_existing([folder / f"{material.name}.csv" for material in synthetic.MATERIALS], force)
-    return synthetic.write_catalogue(folder)
+    _refuse_existing([folder / f"{material.name}.csv" for material in catalogue.MATERIALS], force)
+    return catalogue.write_catalogue(folder)
 
 
 def _refuse_existing(paths: Sequence[Path], force: bool) -> None:

@@ -8,7 +8,6 @@ import pytest
 
 import fitmat
 from fitmat import console
-from fitmat.brdf import LOBES
 from fitmat.errors import ModelError
 from fitmat.posterior import Posterior
 from fitmat.synthetic import simulate
@@ -19,7 +18,7 @@ def posterior() -> Posterior:
     truth = fitmat.model("lambert+ggx", channels=3, kd=np.array([0.4, 0.1, 0.2]), alpha=0.3)
     angles = np.deg2rad([20, 45, 70]), np.deg2rad(np.arange(-80, 81, 10))
     made = simulate(truth, *angles, relative_noise=0.02, absolute_noise=1e-3, seed=1)
-    posteriors, match = console.study(made, ["lambert+ggx"], fixed={}, masking=None, sampling=False, seed=0)
+    posteriors, match = console.study(made, {"lambert+ggx": {}}, fixed={}, masking=None, sampling=False, seed=0)
     assert match is None
     return posteriors[0]
 
@@ -67,31 +66,13 @@ def test_brackets_in_names_are_text(posterior, capsys, tmp_path):
     assert all(text in out for text in ("[red]x.csv", "kd [bold]", "[dim]/report.html"))
 
 
-def test_every_lobe_is_listed_once_with_what_sets_it_apart(capsys):
-    console.list_models()
-    lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines[1:] if line[:1].strip() and line.split()[0] in LOBES] == list(LOBES)
-    assert "ggx with another Fresnel" in " ".join(" ".join(lines).split())
-
-
-@pytest.mark.parametrize("name", LOBES)
-def test_manual_states_every_parameter(name, capsys):
-    console.manual(name)
-    out = capsys.readouterr().out
-    assert max(map(len, out.splitlines())) <= 80
-    for key, (p, default) in LOBES[name].defaults().items():
-        row = [line for line in out.splitlines() if line.startswith(f"{key} ")][-1]
-        assert p.symbol in row
-        assert f"{default:g}" in row
-    assert "Reference" in out
-    assert "Limits" in out
-
-
 def test_options_go_to_the_models_that_have_them(posterior):
     fixed = {"exponent": np.array([20.0]), "kd": np.array([0.3])}
     names = ["lambert+phong", "lambert+ggx"]
     measurements = posterior.fit.measurements
-    posteriors, match = console.study(measurements, names, fixed=fixed, masking="separable", sampling=False, seed=0)
+    posteriors, match = console.study(
+        measurements, {name: {} for name in names}, fixed=fixed, masking="separable", sampling=False, seed=0
+    )
     assert [sorted(p.fit.held) for p in posteriors] == [["exponent", "kd"], ["kd"]]
     assert match is not None
 
@@ -106,7 +87,7 @@ def test_options_go_to_the_models_that_have_them(posterior):
 def test_options_that_concern_no_model(posterior, fixed, masking, sentence):
     measurements = posterior.fit.measurements
     with pytest.raises(ModelError, match=sentence):
-        console.study(measurements, ["lambert"], fixed=fixed, masking=masking, sampling=False, seed=0)
+        console.study(measurements, {"lambert": {}}, fixed=fixed, masking=masking, sampling=False, seed=0)
 
 
 def test_handler_is_restored_after_sampling(posterior, monkeypatch):
@@ -119,6 +100,6 @@ def test_handler_is_restored_after_sampling(posterior, monkeypatch):
         return posterior
 
     monkeypatch.setattr(console, "sample", sample)
-    console.study(posterior.fit.measurements, ["lambert+ggx"], fixed={}, masking=None, sampling=True, seed=0)
+    console.study(posterior.fit.measurements, {"lambert+ggx": {}}, fixed={}, masking=None, sampling=True, seed=0)
     assert seen[0] is not before
     assert signal.getsignal(signal.SIGINT) is before

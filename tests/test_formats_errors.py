@@ -98,7 +98,14 @@ def test_bad_files(tmp_path, content, message):
 
 
 BAD_OPTIONS: dict[str, tuple[str, dict[str, Any], str]] = {
-    "quantity": (VALUE, {"quantity": "radiance"}, "quantity = 'radiance' .*expected 'brdf' or 'brdf_cos' or"),
+    "quantity": (VALUE, {"quantity": "luminance"}, "quantity = 'luminance' .*expected 'brdf' or 'brdf_cos' or"),
+    "radiance without source": (VALUE, {"quantity": "radiance"}, "expected the source beside them: intensity= in W/sr"),
+    "intensity alone": (VALUE, {"quantity": "radiance", "intensity": 1.0}, "intensity alone, expected intensity and"),
+    "no distance": (
+        VALUE,
+        {"quantity": "radiance", "intensity": 1.0, "distance": 0.0},
+        r"distance = 0 \(--distance\), expected a pos",
+    ),
     "angle unit": (GOOD, {"angle_unit": "grad"}, r"angle_unit = 'grad' \(--angle-unit\), expected 'degrees'"),
     "forward": (GOOD, {"forward": "up"}, "forward = 'up' .*expected 'positive' or 'negative'"),
     "specular azimuth": (GOOD, {"specular_azimuth": 90}, "specular_azimuth = 90 .*expected 180 or 0"),

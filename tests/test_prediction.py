@@ -9,7 +9,7 @@ from oracles import ggx
 import fitmat as fm
 from fitmat.outcome import Fit
 from fitmat.posterior import Posterior
-from fitmat.prediction import curve, predictive_band, sections
+from fitmat.prediction import Section, curve, predictive_band, sections
 
 FRESH = 40
 
@@ -71,7 +71,7 @@ def test_curves_are_the_model_along_a_section(fit: Fit) -> None:
     kd, ks, alpha, eta = fit.values
     wi, wo = ggx.hemisphere(np.full(5, np.pi / 4), 0.0), ggx.hemisphere(theta_o, np.pi)
     expected = kd / np.pi + ks * ggx.brdf(wi, wo, alpha, eta)
-    found = curve(fit, np.pi / 4, theta_o)
+    found = curve(fit, Section(np.pi / 4, 0.0, np.arange(5), theta_o), theta_o)
     np.testing.assert_allclose(found[:, 0], expected, rtol=ROUNDING)
     assert found[3, 0] > 1.5 * found[1, 0]
 
@@ -88,6 +88,20 @@ def test_sections_are_sorted_curves_in_the_plane() -> None:
     assert first.rows.tolist() == [1, 3, 0, 2]
     np.testing.assert_allclose(np.rad2deg(first.theta_o)[[0, 2, 3]], [-10, 20, 40])
     assert second.rows.tolist() == [5, 6, 4]
+
+
+def test_sections_keep_azimuths_of_incidence_apart() -> None:
+    """A brushed sample measured along and across; 360° is 0°, and light along the normal has no azimuth."""
+    theta_i, phi_i, theta_o = (
+        np.deg2rad([30.0] * 9),
+        np.deg2rad([0, 0, 360, 90, 90, 90, 0, 0, 0]),
+        np.deg2rad([10.0, 20, 30] * 3),
+    )
+    theta_i[6:] = 0.0
+    table = {"theta_i": np.rad2deg(theta_i), "phi_i": np.rad2deg(phi_i), "theta_o": np.rad2deg(theta_o)}
+    m = fm.read(table | {"phi_o": np.rad2deg(phi_i) % 360.0 + 180.0, "brdf": np.ones(9)})
+    found = [(round(np.rad2deg(s.theta_i)), round(np.rad2deg(s.phi_i)), len(s.rows)) for s in sections(m)]
+    assert found == [(0, 0, 3), (30, 0, 3), (30, 90, 3)]
 
 
 def test_many_sections_are_thinned_evenly() -> None:

@@ -16,7 +16,8 @@ from fitmat.fitting import fit
 from fitmat.formats import read
 from fitmat.measurement import from_arrays
 from fitmat.outcome import Fit
-from fitmat.synthetic import MATERIALS, Material, simulate, write_catalogue, write_csv
+from fitmat.catalogue import MATERIALS, Material, write_catalogue
+from fitmat.synthetic import simulate, write_csv
 
 FOLDER = pathlib.Path(__file__).parents[1] / "data" / "synthetic"
 NAMES = {material.name: material for material in MATERIALS}

@@ -21,6 +21,7 @@ ALIASES = {
     "brdf": ("f_r", "fr", "bsdf"),
     "brdf_cos": ("ccbrdf", "ccbsdf"),
     "reflectance_factor": ("brf",),
+    "radiance": (),
     "value": (),
     "sigma": ("std", "brdf_sigma", "brdf_std"),
     "wavelength": ("wavelength_nm", "lambda", "lambda_nm"),

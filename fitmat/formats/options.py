@@ -6,9 +6,10 @@ They hold no default that would change a value in silence.
 import dataclasses
 
 from fitmat.errors import ReadError
+from fitmat.lighting import PointSource
 
 ALLOWED: dict[str, tuple[str | int | None, ...]] = {
-    "quantity": (None, "brdf", "brdf_cos", "reflectance_factor"),
+    "quantity": (None, "brdf", "brdf_cos", "reflectance_factor", "radiance"),
     "angle_unit": (None, "degrees", "radians"),
     "forward": ("positive", "negative"),
     "specular_azimuth": (180, 0),
@@ -25,12 +26,16 @@ class Options:
         angle_unit: "degrees" or "radians"; None for degrees, refused where the range looks like radians.
         forward: Sign of theta_o on the mirror side, for files without azimuth.
         specular_azimuth: Relative azimuth of the mirror side in the file, 180 or 0 degrees.
+        intensity: Of the point source that caused radiances, W/sr.
+        distance: Of that source, m.
     """
 
     quantity: str | None = None
     angle_unit: str | None = None
     forward: str = "positive"
     specular_azimuth: int = 180
+    intensity: float | None = None
+    distance: float | None = None
 
     def __post_init__(self) -> None:
         for name, choices in ALLOWED.items():
@@ -39,3 +44,13 @@ class Options:
                 expected = " or ".join(repr(choice) for choice in choices if choice is not None)
                 flag = "--" + name.replace("_", "-")
                 raise ReadError(f"{name} = {given!r} ({flag}), expected {expected}. Choose one of these.")
+        if (self.intensity is None) != (self.distance is None):
+            got = "intensity" if self.distance is None else "distance"
+            raise ReadError(f"{got} alone, expected intensity and distance (--intensity, --distance). Give both.")
+
+    @property
+    def source(self) -> PointSource | None:
+        """The point source, where it is described."""
+        if self.intensity is None or self.distance is None:
+            return None
+        return PointSource(self.intensity, self.distance)

@@ -16,7 +16,7 @@ from fitmat.formats import text
 from fitmat.formats.angles import directions
 from fitmat.formats.columns import Columns, assign
 from fitmat.formats.options import Options
-from fitmat.formats.quantity import QUANTITIES, factor
+from fitmat.formats.quantity import factor, note
 from fitmat.formats.samples import Samples, mask, pivot
 from fitmat.formats.table import Table, from_arrays
 from fitmat.geometry import from_angles
@@ -50,6 +50,8 @@ def read(
     angle_unit: str | None = None,
     forward: str = "positive",
     specular_azimuth: int = 180,
+    intensity: float | None = None,
+    distance: float | None = None,
 ) -> Measurements:
     """Read BRDF measurements from a text table, a data frame or a dict of arrays.
 
@@ -57,17 +59,19 @@ def read(
 
     - theta_i, theta_o, and phi = φ_o − φ_i or phi_i and phi_o, in degrees; the mirror side is φ = 180.
       Without azimuth, theta_o is signed: positive is forward, the mirror side.
-    - The quantity: brdf, brdf_cos (= f_r cos θ_o) or reflectance_factor (= π f_r). One column; one for each
+    - The quantity: brdf, brdf_cos (= f_r cos θ_o), reflectance_factor (= π f_r) or radiance. One column; one for each
       channel, as brdf_r or brdf_550; or one row for each channel, beside a column wavelength (nm) or channel.
     - Where known: sigma, or sigma_r …, in the unit of the quantity; valid, or flag.
 
     Args:
         source: Path of a file, pandas or polars data frame, or name → array of n numbers.
         columns: Our name → name or number (from 1) in the file; or as text, "theta_i=Zenith,theta_o=3".
-        quantity: What a column called value holds: "brdf", "brdf_cos" or "reflectance_factor".
+        quantity: What a column called value holds: "brdf", "brdf_cos", "reflectance_factor" or "radiance".
         angle_unit: "degrees" or "radians"; None for degrees, refused where the range looks like radians.
         forward: Sign of theta_o on the mirror side where there is no azimuth: "positive" or "negative".
         specular_azimuth: Relative azimuth of the mirror side in the file, 180 or 0.
+        intensity: Of the point source that lit the sample, W/sr, where radiances in W/(m² sr) were read.
+        distance: Of that source from the sample, m.
 
     Returns:
         All rows, in sr⁻¹ without cosine; what cannot be used is masked (value 0, sigma 1) and counted.
@@ -79,7 +83,7 @@ def read(
         >>> read({"theta_i": [30, 30], "theta_o": [-30, 30], "brf": [1.0, 2.0]}).value.round(2).T
         array([[0.32, 0.64]])
     """
-    options = Options(quantity, angle_unit, forward, specular_azimuth)
+    options = Options(quantity, angle_unit, forward, specular_azimuth, intensity, distance)
     table = _table(source)
     layout = assign(table, columns, options.quantity)
     samples, assumed = _samples(table, layout, options)
@@ -89,7 +93,7 @@ def read(
         expected = "expected at least one value that can be used. Check the columns and units"
         raise ReadError(f"{table.source}: every row is masked ({listed}), {expected}.")
     theta_i, phi_i, theta_o, phi_o = np.nan_to_num(samples.angles).T
-    scale = factor(layout.quantity, theta_o)[:, None]
+    scale = factor(layout.quantity, theta_i, theta_o, options.source)[:, None]
     measured = Measurements(
         wi=from_angles(theta_i, phi_i),
         wo=from_angles(theta_o, phi_o),
@@ -100,7 +104,7 @@ def read(
         source=table.source,
         masked=masked,
     )
-    notes = (*table.notes, QUANTITIES[layout.quantity], *assumed, *_oddities(measured, layout))
+    notes = (*table.notes, note(layout.quantity, options.source), *assumed, *_oddities(measured, layout))
     return dataclasses.replace(measured, notes=notes)
 
 

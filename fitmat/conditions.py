@@ -1,0 +1,103 @@
+"""Conditions: what is known of a sample before a fit, or suspected of its mount, as models and fixed parameters.
+
+It fits nothing; it turns "this is gold" and "it may be tilted" into what `fit` understands.
+"""
+
+import numpy as np
+
+from fitmat.brdf import LOBES, lobe_names, model
+from fitmat.brdf.registry import OVER
+from fitmat.errors import ModelError
+from fitmat.fresnel import Dielectric, f0_f82_from_ior
+from fitmat.measurement import IN_PLANE, Measurements
+from fitmat.params import entries
+from fitmat.refraction import channel_wavelengths, index
+
+ABSORBING = 0.01
+"""κ from which a material counts as a metal: the lower bound of the parameter."""
+
+Known = dict[str, dict[str, np.ndarray]]
+"""Model name → parameter → value to hold."""
+
+
+def of_material(name: str, material: str, channels: tuple[str, ...]) -> Known:
+    """A model whose refractive index is held at the literature's: `ggx` and "Au" make ggx-conductor, η + iκ fixed.
+
+    Every lobe with a Fresnel term takes the index. A metal in a lobe with the dielectric term turns it into
+    `-conductor`.
+
+    Args:
+        name: Of the model.
+        material: As in `fitmat.refraction.index`.
+        channels: Names of the channels, whose wavelengths count.
+
+    Returns:
+        One model, which may have another name, and what to hold.
+
+    Raises:
+        ModelError: no lobe has an index, the material is unknown, a channel has no wavelength, or a transparent
+            material meets a conductor term.
+    """
+    indices = index(material, channel_wavelengths(channels))
+    eta, kappa = np.real(indices), np.imag(indices)
+    metal = bool((kappa > ABSORBING).any())
+    parts = lobe_names(name)
+    bearers = [part for part in parts if "fresnel" in LOBES[part].parts]
+    if not bearers:
+        raise ModelError(f"--ior {material}: {name} has no lobe with a refractive index; use ggx or beckmann.")
+    renamed = {
+        part: f"{part}-conductor" if metal and LOBES[part].parts["fresnel"] is Dielectric else part for part in bearers
+    }
+    covers, base = parts[: name.count(OVER)], parts[name.count(OVER) :]
+    name = OVER.join([*covers, "+".join(renamed.get(part, part) for part in base)])
+    f0, f82 = f0_f82_from_ior(eta, kappa)
+    values = {"eta": eta, "kappa": kappa, "f0": f0, "f82": f82}
+    names = {e.name: e for e in entries(model(name, channels=len(channels)))}
+    known = {}
+    for part in renamed.values():
+        own = {key for key in LOBES[part].defaults() if key in values}
+        if "kappa" in own and not metal:
+            raise ModelError(f"--ior {material} does not absorb light: use the lobe without -conductor or -belcour.")
+        for key in own:
+            entry = names.get(f"{part}.{key}") or names[key]
+            known[entry.name] = values[key] if entry.size == len(channels) else np.mean(values[key], keepdims=True)
+    return {name: known}
+
+
+def tilted(name: str, measurements: Measurements) -> Known:
+    """A model on a sample whose normal may lean; the lean that the measurements cannot show is held at 0.
+
+    In measurements of one plane, turned or not about the normal by 180°, only the lean within it counts to first
+    order.
+
+    Raises:
+        ModelError: the plane is not at azimuth 0 or 90°, so that neither axis can be held.
+    """
+    azimuths = measurements.phi_i[measurements.theta_i > IN_PLANE] % np.pi
+    spread = np.ptp((azimuths - azimuths[:1] + np.pi / 2) % np.pi) if len(azimuths) else 0.0
+    if not measurements.in_plane.all() or spread > IN_PLANE:
+        return {f"tilt{OVER}{name}": {}}
+    plane = float((azimuths[0] + IN_PLANE) % np.pi - IN_PLANE) if len(azimuths) else 0.0
+    across = {"tilt_y": abs(plane) < 2 * IN_PLANE, "tilt_x": abs(plane - np.pi / 2) < 2 * IN_PLANE}
+    if not any(across.values()):
+        raise ModelError(
+            f"{measurements.source}: all measurements lie in one plane at azimuth {np.rad2deg(plane):.1f}°; a tilt can "
+            "be fitted there only if that is 0° or 90°. Turn the azimuths of the file."
+        )
+    return {f"tilt{OVER}{name}": {axis: np.zeros(1) for axis, held in across.items() if held}}
+
+
+def prepared(names: list[str], measurements: Measurements, *, ior: str | None, tilt: bool) -> Known:
+    """The models of a study with what is known of the sample; models without a refractive index stay as they are.
+
+    Raises:
+        ModelError: as `of_material`, where no model has an index, and `tilted`.
+    """
+    known: Known = {name: {} for name in names}
+    if ior is not None:
+        bearing = [n for n in names if any("fresnel" in LOBES[part].parts for part in lobe_names(n))]
+        made = {n: of_material(n, ior, measurements.channels) for n in bearing or names}
+        known = {new: held for n in names for new, held in made.get(n, {n: {}}).items()}
+    if tilt:
+        known = {new: held | more for n, held in known.items() for new, more in tilted(n, measurements).items()}
+    return known

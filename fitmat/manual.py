@@ -1,0 +1,139 @@
+"""What `fitmat models` prints: the list of lobes, the page of each, the table of laws, and that of Fresnel terms.
+
+The pages are the docstrings; nothing is computed here.
+"""
+
+import inspect
+from collections.abc import Callable
+
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+from rich.text import Text
+
+from fitmat import laws
+from fitmat.brdf import LOBES, lobe_names
+
+FRESNEL = "fresnel"
+"""The page that compares the Fresnel terms."""
+
+
+def list_models() -> None:
+    """Print every lobe with the Fresnel terms it can carry and the first line of its manual page."""
+    table = _table("lobe", "or with", "what it is")
+    for name, variants in _families().items():
+        table.add_row(name, Text(" ".join(variants)), Text(_first_line(LOBES[name].shape)))
+    out = Console()
+    out.print(table)
+    out.print(
+        "\nA model is a sum of lobes, lambert+ggx or lambert+ggx-schlick, alone or below a cover: "
+        "varnish-over-lambert+ggx.\n'fitmat models ggx' prints the manual page of a lobe, 'fitmat models fresnel' how "
+        "exact the Fresnel terms are, 'fitmat models --check' which laws the lobes keep.",
+        highlight=False,
+    )
+
+
+def _families() -> dict[str, list[str]]:
+    """Lobes with the exact dielectric, or none, and the suffixes of the other Fresnel terms they exist with."""
+    found: dict[str, list[str]] = {}
+    for name, lobe in LOBES.items():
+        suffix = getattr(lobe.parts.get("fresnel"), "suffix", "")
+        found.setdefault(name.removesuffix(suffix), []).extend([suffix] if suffix else [])
+    return found
+
+
+def _table(*headings: str) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for heading in headings:
+        table.add_column(heading, no_wrap=heading == "lobe")
+    return table
+
+
+def _first_line(documented: object) -> str:
+    return (inspect.getdoc(documented) or "").split("\n", 1)[0]
+
+
+def page(name: str) -> None:
+    """Print the manual page of a lobe, or of every lobe of a model, and its parameters.
+
+    Raises:
+        ModelError: no such lobe.
+    """
+    if name == FRESNEL:
+        fresnel_terms()
+        return
+    out = Console()
+    for part in [name] if name in LOBES else lobe_names(name):
+        lobe = LOBES[part]
+        out.print(f"[bold]{part}[/bold]\n")
+        for paragraph in inspect.cleandoc(lobe.shape.__doc__ or "").split("\n\n"):
+            out.print(" ".join(paragraph.split()) + "\n", markup=False, highlight=False)
+        for law, words in getattr(lobe.shape, "breaks", {}).items():
+            out.print(f"Breaks the law '{law}' ({laws.LAWS[law]}): {words}.\n", markup=False, highlight=False)
+        table = _table("parameter", "symbol", "range", "unit", "default", "channels", "meaning")
+        for key, (p, default) in lobe.defaults().items():
+            spread = "one each" if lobe.per_channel(key) else "shared"
+            unit = "" if p.unit == "1" else p.unit
+            table.add_row(key, p.symbol, f"{p.lower:g} – {p.upper:g}", unit, f"{default:g}", spread, p.doc)
+        out.print(table)
+
+
+def check(*, seed: int = 0, only: Callable[[str], bool] = lambda name: True) -> list[str]:
+    """Measure and print which laws every lobe keeps, with a progress bar on stderr.
+
+    Args:
+        seed: Of the directions and parameters tried.
+        only: Which lobes.
+
+    Returns:
+        The lobes that break a law which they do not declare.
+    """
+    table, surprises = _table("lobe", *laws.LAWS), []
+    names = [name for name in LOBES if only(name)]
+    for name in track(names, "checking", console=Console(stderr=True), transient=True):
+        declared = getattr(LOBES[name].shape, "breaks", {})
+        found = laws.check(name, seed=seed)
+        table.add_row(name, *(_verdict(law, finding, law in declared) for law, finding in found.items()))
+        if any(not finding.holds and law not in declared for law, finding in found.items() if law != "furnace"):
+            surprises.append(name)
+    out = Console()
+    out.print(table)
+    for law, words in laws.LAWS.items():
+        out.print(f"{law}: {words}", highlight=False)
+    return surprises
+
+
+def _verdict(law: str, finding: laws.Finding, declared: bool) -> Text:
+    number = {
+        "positive": f"{finding.number:.2g}",
+        "reciprocal": f"{finding.number:.0e}",
+        "energy": f"{finding.number:.3f}",
+        "gradient": f"{finding.number:.0f} bad",
+        "furnace": f"{finding.number:.3f}",
+    }[law]
+    if finding.holds:
+        return Text("holds" if law in ("positive", "gradient") else f"holds {number}")
+    if law == "furnace":
+        return Text(number, style="dim")
+    return Text(f"broken {number}", style="yellow" if declared else "red")
+
+
+def fresnel_terms() -> None:
+    """Print how far Schlick's, Hoffman's and Belcour's Fresnel terms are from the exact equations."""
+    from fitmat.fresnel_basis import error_table
+
+    errors: dict[str, list[str]] = {}
+    names: list[str] = []
+    for row in error_table():
+        errors.setdefault(row.material, []).extend([f"{row.worst:.4f}", f"{row.mean:.4f}"])
+        names += [row.approximation] if row.approximation not in names else []
+    table = _table("material", *(f"{name} {what}" for name in names for what in ("worst", "mean")))
+    for material, numbers in errors.items():
+        table.add_row(material, *numbers)
+    out = Console()
+    out.print("[bold]Fresnel terms against the exact equations[/bold]\n")
+    out.print(table)
+    out.print("\nAbsolute errors of the reflectance over 0–90° and 400–700 nm.", highlight=False)
+    for suffix in dict.fromkeys(suffix for variants in _families().values() for suffix in variants):
+        term = next(lobe.parts["fresnel"] for name, lobe in LOBES.items() if name == "ggx" + suffix)
+        out.print(f"{suffix}: {_first_line(term)}", markup=False, highlight=False)

@@ -1,0 +1,163 @@
+"""Options: what the flags of the command line are called, and what their help says.
+
+They set no default and check nothing but their type.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+File = Annotated[Path, typer.Argument(help="Measurements: CSV or any text table, one row per pair of directions.")]
+
+Models = Annotated[
+    str,
+    typer.Option(
+        help="Models to fit, separated by commas; see [bold]fitmat models[/bold]. An empirical and a microfacet "
+        "model are compared. Default: lambert+blinn-phong and lambert+ggx.",
+        metavar="NAMES",
+        show_default=False,
+    ),
+]
+
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        help="Folder for the report; default NAME-fitmat (then -2, -3, …) beside the input.",
+        metavar="DIR",
+        show_default=False,
+    ),
+]
+
+Force = Annotated[bool, typer.Option("--force", help="Replace the report of an earlier run in --out.")]
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
+
+NoMcmc = Annotated[
+    bool, typer.Option("--no-mcmc", help="Skip sampling: faster, intervals from Laplace's approximation.")
+]
+
+Seed = Annotated[int, typer.Option(min=0, help="Seed of the sampling; the same seed, the same report.", metavar="N")]
+
+Fix = Annotated[
+    list[str] | None,
+    typer.Option(help="Hold a parameter, e.g. ks=1; repeat for more.", metavar="NAME=VALUE", show_default=False),
+]
+
+Masking = Annotated[
+    str | None,
+    typer.Option(
+        help="Shadowing of microfacet lobes: correlated (default), separable or v-cavity.",
+        metavar="KIND",
+        show_default=False,
+    ),
+]
+
+Columns = Annotated[
+    str | None,
+    typer.Option(
+        help="Which column is what, where the header has other names: theta_i=Zenith,brdf=3 (a name in the "
+        "header, or a column number from 1).",
+        metavar="OURS=THEIRS",
+        show_default=False,
+    ),
+]
+
+Quantity = Annotated[
+    str | None,
+    typer.Option(
+        help="What a column called 'value' holds: brdf (sr⁻¹), brdf_cos, reflectance_factor or radiance.",
+        metavar="KIND",
+        show_default=False,
+    ),
+]
+
+AngleUnit = Annotated[
+    str | None,
+    typer.Option(help="Unit of the angles: degrees (default) or radians.", metavar="UNIT", show_default=False),
+]
+
+Forward = Annotated[
+    str,
+    typer.Option(
+        help="Sign of theta_o on the mirror side, in files without azimuth: positive or negative.", metavar="SIGN"
+    ),
+]
+
+SpecularAzimuth = Annotated[
+    int, typer.Option(help="Relative azimuth phi of the mirror side in the file: 180 or 0.", metavar="PHI")
+]
+
+Intensity = Annotated[
+    float | None,
+    typer.Option(help="Of the source, in W/sr, where the file holds radiances.", metavar="X", show_default=False),
+]
+
+Distance = Annotated[
+    float | None,
+    typer.Option(help="Of the source from the sample, in m, with --intensity.", metavar="X", show_default=False),
+]
+
+Ior = Annotated[
+    str | None,
+    typer.Option(
+        help="Material whose refractive index is fixed from the literature: Au, N-BK7, PMMA, main/Cr/Rakic-BB.",
+        metavar="NAME",
+        show_default=False,
+    ),
+]
+
+Tilt = Annotated[
+    bool, typer.Option("--tilt", help="Fit how far the sample's normal leans in its mount, with every model.")
+]
+
+Model = Annotated[str | None, typer.Argument(help="True model, e.g. lambert+ggx.", show_default=False)]
+
+SimulatedOut = Annotated[Path, typer.Option(help="CSV file to write.")]
+
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        help="A true parameter, e.g. alpha=0.2, or kd=0.4,0.1,0.1 for three channels; repeat for more.",
+        metavar="NAME=VALUE",
+        show_default=False,
+    ),
+]
+
+ThetaI = Annotated[str, typer.Option(help="Incidence angles in degrees, as --theta-o.", metavar="ANGLES")]
+
+ThetaO = Annotated[
+    str,
+    typer.Option(
+        help="Outgoing angles in degrees, FIRST:LAST:STEP or a list A,B,C; positive = mirror side.",
+        metavar="ANGLES",
+    ),
+]
+
+Phi = Annotated[
+    str, typer.Option(help="Relative azimuths in degrees; 180 is the plane of incidence.", metavar="ANGLES")
+]
+
+PhiI = Annotated[str, typer.Option(help="Azimuths of incidence in degrees, for anisotropic samples.", metavar="ANGLES")]
+
+Noise = Annotated[float, typer.Option(min=0, help="Relative noise, as a fraction of the true value.", metavar="X")]
+
+Floor = Annotated[float, typer.Option(min=0, help="Absolute noise in sr⁻¹.", metavar="X")]
+
+SimulatedSeed = Annotated[int, typer.Option(min=0, help="Seed of the noise.", metavar="N")]
+
+Catalogue = Annotated[
+    Path | None,
+    typer.Option(help="Write the catalogue of synthetic materials into this folder instead.", show_default=False),
+]
+
+SimulatedForce = Annotated[bool, typer.Option("--force", help="Replace files that exist.")]
+
+Name = Annotated[
+    str | None, typer.Argument(help="A lobe or model, e.g. ggx or lambert+ggx; 'fresnel' for the Fresnel terms.")
+]
+
+Check = Annotated[
+    bool, typer.Option("--check", help="Measure which laws of reflection every lobe keeps (some minutes).")
+]
