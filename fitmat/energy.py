@@ -14,8 +14,13 @@ from jaxtyping import Array, ArrayLike, Float
 from fitmat.brdf import AbstractBRDF
 from fitmat.quadrature import AZIMUTH_NODES, ZENITH_NODES, incidence_rule, lobe_rule
 
+FINE = (ZENITH_NODES, AZIMUTH_NODES)
+
 COARSE = (ZENITH_NODES * 3 // 4, AZIMUTH_NODES * 3 // 4)
 """Nodes of the second, coarser rule; the error of a converging rule is well below its distance from a coarser one."""
+
+LEAST = 1e-4
+"""What the bound never falls below: two rules may agree by chance."""
 
 AZIMUTHS = 8
 """Azimuths of incidence over half a turn in the hemispherical albedo of anisotropic models."""
@@ -27,7 +32,8 @@ class Albedo:
 
     Attributes:
         value: One row per incidence, one column per channel; 1 is all of it.
-        error: Bound of the quadrature's error, same shape: the distance of two rules, of which the finer gave `value`.
+        error: Bound of the quadrature's error, same shape: twice the distance of two rules, of which the finer gave
+            `value`, and `LEAST`.
     """
 
     value: Float[np.ndarray, "k c"]
@@ -52,10 +58,7 @@ def directional_albedo(model: AbstractBRDF, theta_i: ArrayLike, phi_i: ArrayLike
     """
     theta, phi = np.broadcast_arrays(np.atleast_1d(np.asarray(theta_i, float)), np.asarray(phi_i, float))
     fine, coarse = (np.asarray(_albedo(model, jnp.asarray(theta), jnp.asarray(phi), n)) for n in (FINE, COARSE))
-    return Albedo(fine, np.abs(fine - coarse))
-
-
-FINE = (ZENITH_NODES, AZIMUTH_NODES)
+    return Albedo(fine, 2.0 * np.abs(fine - coarse) + LEAST)
 
 
 def hemispherical_albedo(model: AbstractBRDF) -> Albedo:

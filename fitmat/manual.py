@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fitmat import laws
-from fitmat.brdf import LOBES, lobe_names
+from fitmat.brdf import LOBES, lobe_names, model
 
 FRESNEL = "fresnel"
 """The page that compares the Fresnel terms."""
@@ -37,7 +37,7 @@ def _families() -> dict[str, list[str]]:
     """Lobes with the exact dielectric, or none, and the suffixes of the other Fresnel terms they exist with."""
     found: dict[str, list[str]] = {}
     for name, lobe in LOBES.items():
-        suffix = getattr(lobe.parts.get("fresnel"), "suffix", "")
+        suffix = lobe.fresnel_suffix(name)
         found.setdefault(name.removesuffix(suffix), []).extend([suffix] if suffix else [])
     return found
 
@@ -68,7 +68,7 @@ def page(name: str) -> None:
         out.print(f"[bold]{part}[/bold]\n")
         for paragraph in inspect.cleandoc(lobe.shape.__doc__ or "").split("\n\n"):
             out.print(" ".join(paragraph.split()) + "\n", markup=False, highlight=False)
-        for law, words in getattr(lobe.shape, "breaks", {}).items():
+        for law, words in lobe.breaks.items():
             out.print(f"Breaks the law '{law}' ({laws.LAWS[law]}): {words}.\n", markup=False, highlight=False)
         table = _table("parameter", "symbol", "range", "unit", "default", "channels", "meaning")
         for key, (p, default) in lobe.defaults().items():
@@ -91,8 +91,8 @@ def check(*, seed: int = 0, only: Callable[[str], bool] = lambda name: True) -> 
     table, surprises = _table("lobe", *laws.LAWS), []
     names = [name for name in LOBES if only(name)]
     for name in track(names, "checking", console=Console(stderr=True), transient=True):
-        declared = getattr(LOBES[name].shape, "breaks", {})
-        found = laws.check(name, seed=seed)
+        declared = LOBES[name].breaks
+        found = laws.check(model(laws.example(name)), seed=seed)
         table.add_row(name, *(_verdict(law, finding, law in declared) for law, finding in found.items()))
         if any(not finding.holds and law not in declared for law, finding in found.items() if law != "furnace"):
             surprises.append(name)

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from jax.scipy.special import erf
 
 from fitmat._types import Scalar, Vec3
-from fitmat.geometry import COS_MIN, Pair, rotated
+from fitmat.geometry import COS_MIN, Pair, pair, rotated
 from fitmat.params import param
 
 Masking = Literal["correlated", "separable", "v-cavity"]
@@ -39,6 +39,11 @@ class AbstractRoughness(eqx.Module):
     @abstractmethod
     def local(self, w: Vec3) -> Vec3:
         """A direction in the frame whose x axis is the tangent, along which alpha_x is meant."""
+
+    def pair(self, wi: Vec3, wo: Vec3) -> Pair:
+        """Two directions and their half vector in the local frame; h is turned, not made of turned directions."""
+        level = pair(wi, wo)
+        return Pair(self.local(wi), self.local(wo), self.local(level.h), level.cos_d)
 
     def width(self) -> Scalar:
         """The smaller slope."""

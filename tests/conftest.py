@@ -53,30 +53,9 @@ def hemisphere() -> Hemisphere:
     return draw
 
 
-def _tilted(cos: float, phi: float) -> np.ndarray:
-    sin = np.sqrt(1 - cos**2)
-    return np.array([sin * np.cos(phi), sin * np.sin(phi), cos])
-
-
 @pytest.fixture(scope="session")
 def singular() -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Where formulas of reflection divide by zero or take the root of zero, by name."""
-    normal, oblique, flat, almost = _tilted(1, 0), _tilted(0.6, 1.0), _tilted(0, 0.3), _tilted(1e-12, 0.3)
-    reverse = np.array([-1.0, -1.0, 1.0])
-    return {
-        "normal incidence": (normal, oblique),
-        "both along the normal": (normal, normal),
-        "retro-reflection": (oblique, oblique),
-        "mirror, h = n": (oblique, oblique * reverse),
-        "light at cos 0": (flat, oblique),
-        "light at cos 1e-12": (almost, oblique),
-        "sensor at cos 1e-12": (oblique, almost),
-        "both at cos 1e-12, forward": (almost, almost * reverse),
-        "both at cos 1e-12, backward": (almost, almost),
-        "both at cos 1e-12, across": (almost, _tilted(1e-12, 1.9)),
-        "wi = -wo at the horizon": (flat, -flat),
-        "wi = -wo": (oblique, -oblique),
-        "nearly the normal": (normal, _tilted(1 - 1e-15, 2.0)),
-        "nearly retro-reflection": (oblique, _tilted(0.6 + 1e-9, 1.0)),
-        "nearly the mirror": (oblique, _tilted(0.6, 1.0 + np.pi + 1e-9)),
-    }
+    from fitmat import laws
+
+    return laws.singular()

@@ -6,7 +6,7 @@ No formula of any material stands here.
 from abc import abstractmethod
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -16,6 +16,7 @@ from jaxtyping import ArrayLike, Float
 
 from fitmat._types import Directions, Samples, Scalar, Spectrum, Vec3
 from fitmat.errors import ModelError
+from fitmat.params import param
 
 
 class AbstractBRDF(eqx.Module):
@@ -53,6 +54,11 @@ class AbstractBRDF(eqx.Module):
     @abstractmethod
     def diffuse_albedo(self) -> Spectrum:
         """Albedo of what leaves in all directions alike, in [0, 1]; what a coat above sends back and forth."""
+
+
+def specular_weight(doc: str = "specular weight; 1 for a bare surface") -> Any:
+    """The parameter ks, in which a specular lobe is linear."""
+    return param(0.0, 10.0, symbol="k_s", per_channel=True, weight=True, default=1.0, doc=doc)
 
 
 class Sum(AbstractBRDF):

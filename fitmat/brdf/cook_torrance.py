@@ -8,8 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
-from fitmat.brdf.base import AbstractBRDF
-from fitmat.brdf.microfacet import lobe_weight
+from fitmat.brdf.base import AbstractBRDF, specular_weight
 from fitmat.fresnel import AbstractFresnel, Dielectric
 from fitmat.geometry import above, pair
 from fitmat.microfacet import Beckmann, Isotropic, Masking, visibility
@@ -40,7 +39,7 @@ class CookTorrance(AbstractBRDF):
         {"energy": "with ks = 1 it reflects up to 4 F0 of the light: D' = π D, and π where Walter has 4"}
     )
 
-    ks: Spectrum = lobe_weight()
+    ks: Spectrum = specular_weight()
     roughness: Isotropic = eqx.field(default_factory=Isotropic)
     fresnel: AbstractFresnel = eqx.field(default_factory=Dielectric)
     masking: Masking = eqx.field(static=True, default="v-cavity")

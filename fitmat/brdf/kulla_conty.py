@@ -5,8 +5,8 @@ import jax
 import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
-from fitmat.brdf.base import AbstractBRDF
-from fitmat.brdf.microfacet import Microfacet, lobe_weight
+from fitmat.brdf.base import AbstractBRDF, specular_weight
+from fitmat.brdf.microfacet import Microfacet
 from fitmat.fresnel import AbstractFresnel, Dielectric, White, average
 from fitmat.geometry import above
 from fitmat.microfacet import GGX, AbstractDistribution, Isotropic, Masking
@@ -40,7 +40,7 @@ class KullaConty(AbstractBRDF):
     Example: `fm.model("ggx-kc-conductor", alpha=0.5, eta=0.2, kappa=3.5)`
     """
 
-    ks: Spectrum = lobe_weight()
+    ks: Spectrum = specular_weight()
     roughness: Isotropic = eqx.field(default_factory=Isotropic)
     fresnel: AbstractFresnel = eqx.field(default_factory=Dielectric)
     distribution: AbstractDistribution = eqx.field(default_factory=GGX)

@@ -1,24 +1,13 @@
 """The microfacet reflection of today's renderers: GGX or Beckmann normals, any roughness, Fresnel and masking."""
 
-from typing import Any
-
 import equinox as eqx
 import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
-from fitmat.brdf.base import AbstractBRDF
+from fitmat.brdf.base import AbstractBRDF, specular_weight
 from fitmat.fresnel import AbstractFresnel, Dielectric
-from fitmat.geometry import above, pair
+from fitmat.geometry import above
 from fitmat.microfacet import GGX, AbstractDistribution, AbstractRoughness, Isotropic, Masking, visibility
-from fitmat.params import param
-
-
-def lobe_weight() -> Any:
-    """The parameter ks of a microfacet lobe."""
-    return param(
-        0.0, 10.0, symbol="k_s", per_channel=True, weight=True, default=1.0,
-        doc="specular weight; 1 for a bare surface",
-    )  # fmt: skip
 
 
 class Microfacet(AbstractBRDF):
@@ -45,7 +34,7 @@ class Microfacet(AbstractBRDF):
     Example: `fm.model("lambert+ggx", kd=0.3, alpha=0.2, eta=1.5)`
     """
 
-    ks: Spectrum = lobe_weight()
+    ks: Spectrum = specular_weight()
     roughness: AbstractRoughness = eqx.field(default_factory=Isotropic)
     fresnel: AbstractFresnel = eqx.field(default_factory=Dielectric)
     distribution: AbstractDistribution = eqx.field(default_factory=GGX)
@@ -58,7 +47,7 @@ class Microfacet(AbstractBRDF):
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """ks F D G/(4 c_i c_o)."""
-        p, slopes = pair(self.roughness.local(wi), self.roughness.local(wo)), self.roughness.slopes
+        p, slopes = self.roughness.pair(wi, wo), self.roughness.slopes
         density = self.distribution.density(p.h, slopes)
         g_cc = visibility(self.distribution, self.masking, slopes, p)
         return jnp.where(above(wi, wo), self.ks * self.fresnel(p.cos_d) * density * g_cc / 4.0, 0.0)

@@ -7,16 +7,11 @@ from typing import Any, ClassVar
 import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
-from fitmat.brdf.base import AbstractBRDF
+from fitmat.brdf.base import AbstractBRDF, specular_weight
 from fitmat.geometry import above, half_vector, mirror
 from fitmat.params import param
 
-
-def _ks() -> Any:
-    return param(
-        0.0, 10.0, symbol="k_s", per_channel=True, weight=True, default=1.0,
-        doc="specular weight; about the lobe's albedo at normal incidence",
-    )  # fmt: skip
+_ALBEDO = "specular weight; about the lobe's albedo at normal incidence"
 
 
 def _exponent() -> Any:
@@ -54,7 +49,7 @@ class Phong(AbstractBRDF):
     Example: `fm.model("lambert+phong", kd=0.3, ks=0.1, exponent=40)`
     """
 
-    ks: Spectrum = _ks()
+    ks: Spectrum = specular_weight(_ALBEDO)
     exponent: Scalar = _exponent()
 
     @property
@@ -103,7 +98,7 @@ class BlinnPhong(AbstractBRDF):
         {"energy": "with ks = 1 it reflects up to 7.5 % more than it receives: albedo 1.063 at n = 4, 1.075 at n = 10"}
     )
 
-    ks: Spectrum = _ks()
+    ks: Spectrum = specular_weight(_ALBEDO)
     exponent: Scalar = _exponent()
 
     @property
@@ -147,7 +142,7 @@ class BlinnPhongExact(AbstractBRDF):
     Example: `fm.model("lambert+blinn-phong-exact", kd=0.3, ks=0.05, exponent=100)`
     """
 
-    ks: Spectrum = _ks()
+    ks: Spectrum = specular_weight(_ALBEDO)
     exponent: Scalar = _exponent()
 
     @property

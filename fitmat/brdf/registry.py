@@ -11,16 +11,23 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import ArrayLike
 
+from fitmat.brdf.abg import ABg
+from fitmat.brdf.ashikhmin_shirley import AshikhminShirley, OneExponent, TwoExponents
 from fitmat.brdf.base import AbstractBRDF, Sum
 from fitmat.brdf.coating import RoughCoat, SmoothCoat, Varnish
 from fitmat.brdf.cook_torrance import CookTorrance
+from fitmat.brdf.disney_2012 import Disney2012
+from fitmat.brdf.disney_2015 import Disney2015
+from fitmat.brdf.disney_terms import Clearcoat, Perceptual, Sheen
 from fitmat.brdf.kulla_conty import KullaConty
 from fitmat.brdf.lambert import Lambert
 from fitmat.brdf.microfacet import Microfacet
+from fitmat.brdf.oren_nayar import EnergyPreservingOrenNayar, OrenNayar, OrenNayarFull
 from fitmat.brdf.phong import BlinnPhong, BlinnPhongExact, Phong
 from fitmat.brdf.plastic import Plastic
 from fitmat.brdf.tilt import Tilted
 from fitmat.brdf.walter import Walter
+from fitmat.brdf.ward import Ward, WardBounded
 from fitmat.errors import ModelError
 from fitmat.fresnel import F82, Conductor, Dielectric, Schlick
 from fitmat.fresnel_basis import Belcour
@@ -65,6 +72,16 @@ class Lobe:
             return not any(f.metadata["param"].per_channel for f in fresnel)
         return self.defaults()[name][0].per_channel
 
+    def fresnel_suffix(self, name: str) -> str:
+        """What in a lobe's name says its Fresnel term; "" for the default and where the lobe has no choice."""
+        suffix = getattr(self.parts.get("fresnel"), "suffix", "")
+        return suffix if name.endswith(suffix) else ""
+
+    @property
+    def breaks(self) -> Mapping[str, str]:
+        """Law → how the lobe breaks it; see `AbstractBRDF.breaks`."""
+        return getattr(self.shape, "breaks", {})
+
     @property
     def has_masking(self) -> bool:
         """Whether its shadowing can be chosen."""
@@ -100,11 +117,23 @@ def _walter(distribution: type[eqx.Module]) -> Lobe:
     return Lobe(Walter, "microfacet", {"roughness": Isotropic, "fresnel": Dielectric, "distribution": distribution})
 
 
+_DISNEY = {"shape": Perceptual, "fabric": Sheen, "coat": Clearcoat}
+
 LOBES: dict[str, Lobe] = {
     "lambert": Lobe(Lambert, "diffuse"),
+    "oren-nayar": Lobe(OrenNayar, "diffuse"),
+    "oren-nayar-full": Lobe(OrenNayarFull, "diffuse"),
+    "eon": Lobe(EnergyPreservingOrenNayar, "diffuse"),
     "phong": Lobe(Phong, "empirical"),
     "blinn-phong": Lobe(BlinnPhong, "empirical"),
     "blinn-phong-exact": Lobe(BlinnPhongExact, "empirical"),
+    **{"ward" + r.suffix: Lobe(Ward, "empirical", {"roughness": r}) for r in (Isotropic, Anisotropic)},
+    **{"ward-gmd" + r.suffix: Lobe(WardBounded, "empirical", {"roughness": r}) for r in (Isotropic, Anisotropic)},
+    **{
+        "ashikhmin-shirley" + e.suffix: Lobe(AshikhminShirley, "empirical", {"exponents": e, "fresnel": Schlick})
+        for e in (OneExponent, TwoExponents)
+    },
+    "abg": Lobe(ABg, "empirical"),
     **{
         "cook-torrance" + f.suffix: Lobe(CookTorrance, "microfacet", {"roughness": Isotropic, "fresnel": f})
         for f in FRESNELS
@@ -114,6 +143,8 @@ LOBES: dict[str, Lobe] = {
     **_microfacet(),
     **_kulla_conty(),
     "plastic": Lobe(Plastic, "microfacet"),
+    "disney-2012": Lobe(Disney2012, "microfacet", _DISNEY),
+    "disney-2015": Lobe(Disney2015, "microfacet", _DISNEY),
     "varnish": Lobe(Varnish, "cover", {"coat": SmoothCoat}),
     "rough-varnish": Lobe(Varnish, "cover", {"coat": RoughCoat}),
     "tilt": Lobe(Tilted, "cover"),

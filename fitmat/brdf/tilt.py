@@ -1,5 +1,9 @@
 """Tilt: a sample that is not quite level in its mount."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import ClassVar
+
 import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
@@ -27,12 +31,20 @@ class Tilted(AbstractBRDF):
     Parameters: tilt_x and tilt_y, −15° to 15°, shared; and those of the base. x is the azimuth 0 of the measurements.
 
     Limits: at tilt 0 the base itself. Measurements in one plane only determine the tilt within that plane: fix the
-    other one (`--fix tilt_y=0`). Positive; not reciprocal, since only the illumination's cosine is corrected for.
+    other one (`--fix tilt_y=0`). Positive; neither reciprocal nor bounded by 1 in albedo, since only the
+    illumination's cosine is corrected for.
 
     Reference: M. Mikkelsen, Surface gradient-based bump mapping framework, JCGT 9(3), 2020.
 
     Example: `fm.model("tilt-over-lambert+ggx", kd=0.3, alpha=0.05, tilt_x=0.4)`
     """
+
+    breaks: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {
+            "reciprocal": "the value is per irradiance of a level sample: only the light's cosine is corrected for",
+            "energy": "a slope of 15° to the light catches more than a level one: at 85° cos 70°/cos 85° = 3.92",
+        }
+    )
 
     base: AbstractBRDF
     tilt_x: Scalar = _tilt("t_x", "x")

@@ -4,8 +4,8 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
-from fitmat.brdf.base import AbstractBRDF
-from fitmat.brdf.microfacet import Microfacet, lobe_weight
+from fitmat.brdf.base import AbstractBRDF, specular_weight
+from fitmat.brdf.microfacet import Microfacet
 from fitmat.fresnel import AbstractFresnel, Dielectric
 from fitmat.microfacet import GGX, AbstractDistribution, Isotropic
 
@@ -28,7 +28,7 @@ class Walter(AbstractBRDF):
     Example: `fm.model("lambert+walter-ggx", kd=0.3, alpha=0.2, eta=1.5)`
     """
 
-    ks: Spectrum = lobe_weight()
+    ks: Spectrum = specular_weight()
     roughness: Isotropic = eqx.field(default_factory=Isotropic)
     fresnel: AbstractFresnel = eqx.field(default_factory=Dielectric)
     distribution: AbstractDistribution = eqx.field(default_factory=GGX)
