@@ -284,7 +284,7 @@ def _uncertainty(
     released = inverse_information(information[np.ix_(free, free)], span[free])
     limit = np.where(coordinates.log, UNDETERMINED["log"], UNDETERMINED["linear"] * span)[free]
     loose = set(free[~(np.sqrt(np.diagonal(released)) <= limit)])
-    on_bound = coordinates.at_bound(values) != 0
+    on_bound = (coordinates.at_bound(values) != 0) & np.isin(np.arange(len(values)), free)
     inside = free[~on_bound[free]]
     if loose:
         natural = released[np.ix_(~on_bound[free], ~on_bound[free])]

@@ -88,7 +88,7 @@ def facets(
     h = jnp.stack([jnp.sin(theta_h) * jnp.cos(phi), jnp.sin(theta_h) * jnp.sin(phi), jnp.cos(theta_h) + 0.0 * phi])
     if phi_i is not None:
         wi, h = rotated(wi, phi_i), rotated(h, phi_i)
-    return jax.lax.stop_gradient(Facets(wi, h.reshape(3, -1).T, solid.ravel()))
+    return jax.lax.stop_gradient(Facets(wi, h.reshape(3, -1).T, jnp.ravel(solid)))
 
 
 def reflected(normals: Facets) -> Rule:

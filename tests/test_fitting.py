@@ -9,7 +9,6 @@ import pytest
 from scipy.optimize import curve_fit
 
 import fitmat as fm
-from fitmat.brdf import LOBES
 from fitmat.errors import FitmatError, ModelError
 from fitmat.outcome import RESULTS, Fit, inverse_information
 
@@ -24,24 +23,6 @@ SAME = 1e-6
 
 LIGHT, SENSOR = np.deg2rad([20, 45, 70]), np.deg2rad(np.arange(-80, 81, 10))
 # 51 rows: all files here share the programs compiled for 64.
-
-FRESNEL: dict[str, dict[str, Any]] = {
-    "": {"eta": 1.6},
-    "-schlick": {"f0": 0.1},
-    "-conductor": {"eta": 0.5, "kappa": 2.5},
-}
-TRUTHS: dict[str, dict[str, Any]] = {
-    "lambert": {"kd": 0.4},
-    "phong": {"ks": 0.3, "exponent": 20.0},
-    "blinn-phong": {"ks": 0.3, "exponent": 20.0},
-    "blinn-phong-exact": {"ks": 0.3, "exponent": 20.0},
-    **{
-        f"{lobe}{end}": {"alpha": 0.3, **v}
-        for lobe in ("ggx", "beckmann", "cook-torrance")
-        for end, v in FRESNEL.items()
-    },
-}
-"""Every lobe with parameters that 51 samples determine, once ks of the microfacet lobes is fixed."""
 
 
 def seen(truth: Any, seed: int = 1, relative: float = 0.02, absolute: float = 1e-3) -> fm.Measurements:
@@ -69,18 +50,6 @@ def plastic() -> fm.Measurements:
 @pytest.fixture(scope="module")
 def found(plastic: fm.Measurements) -> Fit:
     return fm.fit(plastic, "lambert+ggx")
-
-
-@pytest.mark.parametrize("name", LOBES)
-def test_the_truth_is_recovered(name: str) -> None:
-    truth, fixed = fm.model(name, **TRUTHS[name]), {"ks": 1.0} if LOBES[name].fresnel else {}
-    found = fm.fit(seen(truth), name, fixed=fixed)
-    assert found.result == "converged"
-    assert found.misfit_ratio < 0.5
-    assert np.abs(deviations(found, truth)).max() < SIGMAS
-    for entry in found.entries:
-        held = entry.name in fixed
-        assert (found.values[entry.place] == 1.0) == (found.covariance[entry.place, entry.place] == 0.0) == held
 
 
 def test_a_model_may_be_fixed_altogether(plastic: fm.Measurements) -> None:

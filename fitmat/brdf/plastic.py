@@ -27,8 +27,10 @@ class Plastic(AbstractBRDF):
 
     Static choice: masking, as `ggx`; "separable" is Mitsuba's.
 
-    Limits: kd = 0 is black plastic; eta = 1 is `lambert`. Single scattering at the face. Positive, reciprocal,
-    conserves energy for ks ≤ 1.
+    Limits: kd = 0 is black plastic; eta = 1 is `lambert` where alpha is small. Single scattering at the face: what
+    its facets mask after one crossing stays lost, for alpha = 1 more than half at grazing angles. R is all that does
+    not cross from inside; Mitsuba's is what one scattering reflects, so that its body is darker: values for kd = 0.5
+    differ by up to 1 % at alpha 0.03, 3 % at 0.1, 13 % at 0.3. Positive, reciprocal, conserves energy for ks ≤ 1.
 
     References: B. Walter et al., EGSR 2007; internal reflection: J. Saunderson, JOSA 32, 1942; as in W. Jakob et al.,
     Mitsuba 3, plugin `roughplastic` with `nonlinear`.
