@@ -2,11 +2,14 @@ from .brdf import evaluate as evaluate
 from .brdf import model as model
 from .comparison import Comparison as Comparison
 from .comparison import compare as compare
+from .energy import directional_albedo as directional_albedo
+from .energy import hemispherical_albedo as hemispherical_albedo
 from .errors import FitmatError as FitmatError
 from .fitting import fit as fit
 from .formats import read as read
 from .measurement import Measurements as Measurements
 from .measurement import from_arrays as from_arrays
+from .microsurface import Surface as Surface
 from .outcome import Fit as Fit
 from .plots import plot_albedo as plot_albedo
 from .plots import plot_corner as plot_corner
@@ -14,6 +17,9 @@ from .plots import plot_residuals as plot_residuals
 from .plots import plot_section as plot_section
 from .posterior import Posterior as Posterior
 from .prediction import sections as sections
+from .slab import evaluate_slab as evaluate_slab
 from .synthetic import simulate as simulate
 from .uncertainty import laplace as laplace
 from .uncertainty import sample as sample
+from .walk import albedo_walk as albedo_walk
+from .walk import evaluate_walk as evaluate_walk

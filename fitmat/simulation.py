@@ -83,9 +83,15 @@ def write_simulation(
     _refuse_existing([path], force)
     theta_i, theta_o, phi, phi_i = (np.deg2rad(part) for part in geometry)
     relative, absolute, seed = noise
-    azimuths = {"phi": phi, "phi_i": phi_i}
     measured = synthetic.simulate(
-        material, theta_i, theta_o, **azimuths, relative_noise=relative, absolute_noise=absolute, seed=seed
+        material,
+        theta_i,
+        theta_o,
+        phi=phi,
+        phi_i=phi_i,
+        relative_noise=relative,
+        absolute_noise=absolute,
+        seed=seed,
     )
     described = f"simulated {material.name}; noise {relative:g} relative + {absolute:g} sr^-1, seed {seed}"
     return (synthetic.write_csv(measured, path, [described]),)

@@ -102,7 +102,7 @@ BAD_ARGUMENTS: dict[str, tuple[tuple[str, ...], str]] = {
     "directory": (("fit", "."), "a directory, expected a file"),
     "no such file": (("fit", "none.csv"), r"none\.csv: no such file"),
     "no model": (("fit", "sparse.csv", "--models", ","), "no model given; try --models"),
-    "unknown lobe": (("fit", "sparse.csv", "--models", "lambert+ggg"), "no lobe 'ggg'; known lobes are lambert, phong"),
+    "unknown lobe": (("fit", "sparse.csv", "--models", "lambert+ggg"), "no lobe 'ggg'; try ggx"),
     "same lobe twice": (("fit", "sparse.csv", "--models", "ggx+ggx"), "the same lobe twice"),
     "unknown parameter": (("fit", "sparse.csv", "--fix", "zz=1"), "--fix zz: no model of .* they have alpha, eta"),
     "not an assignment": (("fit", "sparse.csv", "--fix", "ks"), "--fix 'ks': expected NAME=NUMBER"),
@@ -115,7 +115,7 @@ BAD_ARGUMENTS: dict[str, tuple[tuple[str, ...], str]] = {
     "out below a file": (("fit", "sparse.csv", "--out", "sparse.csv/x"), "cannot write .*: Not a directory; choose"),
     "out not writable": (("fit", "sparse.csv", "--out", "/proc/x"), "cannot write /proc/x: .*; choose another place"),
     "name too long": (("fit", "sparse.csv", "--out", "a" * 300), "File name too long; choose another place"),
-    "no manual": (("models", "foo"), "no lobe 'foo'; known lobes"),
+    "no manual": (("models", "foo"), "no lobe 'foo'; try "),
     "simulate nothing": (("simulate",), r"name a model to simulate, for example lambert\+ggx"),
     "simulate unknown": (("simulate", "lambert", "--set", "x=1"), "has no parameter 'x'; it has kd"),
     "two values of a shared parameter": (

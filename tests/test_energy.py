@@ -1,5 +1,7 @@
 """Directional albedo against closed forms and against an average over Heitz's visible normals."""
 
+from typing import Any
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -67,7 +69,7 @@ def test_evenly_lit_a_mirror_of_glass_reflects_judds_fraction() -> None:
 def test_a_brushed_surface_is_darker_along_one_azimuth() -> None:
     """Turning sample and light together changes nothing; equal slopes are the isotropic lobe."""
     theta = np.full(3, np.deg2rad(70.0))
-    brushed = {"alpha_x": 0.1, "alpha_y": 0.5}
+    brushed: dict[str, Any] = {"alpha_x": 0.1, "alpha_y": 0.5}
     level = directional_albedo(fm.model("ggx-aniso", **brushed), theta, np.deg2rad([0.0, 45.0, 90.0])).value[:, 0]
     turned = directional_albedo(fm.model("ggx-aniso", **brushed, rotation=30.0), theta, np.deg2rad([30.0, 75.0, 120.0]))
     np.testing.assert_allclose(turned.value[:, 0], level, rtol=NARROW)

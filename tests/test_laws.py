@@ -25,6 +25,10 @@ ALL = [*(laws.example(name) for name in LOBES), *SUMS]
 PLAIN = [name for name, lobe in LOBES.items() if not lobe.fresnel_suffix(name)]
 """One lobe for each class, roughness and distribution: with the exact dielectric, or without a Fresnel term."""
 
+TRIED = [n for n, lobe in LOBES.items() if not (lobe.fresnel_suffix(n) and ("-aniso" in n or "-kc" in n))]
+"""Fresnel terms are the same code in every lobe: tried with isotropic roughness and without compensation only. All
+combinations are measured by `fitmat models --check`."""
+
 FAMILIES = pytest.mark.parametrize("name", [*(laws.example(name) for name in PLAIN), *SUMS])
 
 EXACT = 1e-10
@@ -57,14 +61,14 @@ def findings(name: str) -> dict[str, laws.Finding]:
 
 
 @pytest.mark.parametrize("law", ["positive", "reciprocal", "energy", "gradient"])
-@pytest.mark.parametrize("name", LOBES)
+@pytest.mark.parametrize("name", TRIED)
 def test_laws_hold_where_they_are_not_declared_broken(name: str, law: str) -> None:
     """Over parameters drawn within their bounds; a declared exception must be seen broken."""
     found = findings(name)[law]
     assert found.holds == (law not in LOBES[name].breaks), found
 
 
-@pytest.mark.parametrize("name", ["lambert", "ggx-kc", "ggx-kc-conductor", "beckmann-kc"])
+@pytest.mark.parametrize("name", ["lambert", "eon", "ggx-kc", "beckmann-kc"])
 def test_nothing_is_lost_in_the_white_furnace(name: str) -> None:
     assert findings(name)["furnace"].holds
 

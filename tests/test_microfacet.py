@@ -60,7 +60,7 @@ def _normals(theta: np.ndarray, phi: np.ndarray | float) -> np.ndarray:
 
 
 def _slopes(alpha: float | tuple[float, float]) -> Slopes:
-    x, y = (alpha, alpha) if isinstance(alpha, float) else alpha
+    x, y = alpha if isinstance(alpha, tuple) else (alpha, alpha)
     return jnp.array(x), jnp.array(y)
 
 

@@ -27,7 +27,9 @@ def studied() -> tuple[list[Posterior], Comparison]:
     valid = made.valid.copy()
     valid[0, 1] = False
     made = dataclasses.replace(made, valid=valid)
-    posteriors, match = console.study(made, dict.fromkeys(NAMES, {}), fixed={}, masking=None, sampling=False, seed=0)
+    posteriors, match = console.study(
+        made, {name: {} for name in NAMES}, fixed={}, masking=None, sampling=False, seed=0
+    )
     assert match is not None
     return posteriors, match
 

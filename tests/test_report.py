@@ -35,7 +35,7 @@ def paint() -> Measurements:
 
 @pytest.fixture(scope="module")
 def studied() -> Study:
-    return console.study(paint(), dict.fromkeys(NAMES, {}), fixed={}, masking=None, sampling=False, seed=0)
+    return console.study(paint(), {name: {} for name in NAMES}, fixed={}, masking=None, sampling=False, seed=0)
 
 
 @pytest.fixture(scope="module")

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from fitmat.brdf import AbstractBRDF, evaluate, model
+from fitmat.catalogue import MATERIALS, Material, write_catalogue
 from fitmat.errors import FitmatError, ModelError, OutputError
 from fitmat.fitting import fit
 from fitmat.formats import read
 from fitmat.measurement import from_arrays
 from fitmat.outcome import Fit
-from fitmat.catalogue import MATERIALS, Material, write_catalogue
 from fitmat.synthetic import simulate, write_csv
 
 FOLDER = pathlib.Path(__file__).parents[1] / "data" / "synthetic"

@@ -4,6 +4,7 @@ Knows no formula; every lobe is described where it is defined.
 """
 
 import dataclasses
+import difflib
 from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
@@ -57,7 +58,7 @@ class Lobe:
     kind: Kind
     parts: Mapping[str, type[eqx.Module]] = dataclasses.field(default_factory=dict)
 
-    def defaults(self) -> dict[str, tuple[Param, Any]]:
+    def defaults(self) -> dict[str, tuple[Param, float]]:
         """Parameter name → (its `Param`, its default value), in the order of the model's vector."""
         found = {}
         for field in _fields(self.shape):
@@ -85,7 +86,7 @@ class Lobe:
     @property
     def has_masking(self) -> bool:
         """Whether its shadowing can be chosen."""
-        return any(f.name == "masking" for f in _fields(self.shape))
+        return any(f.name == "masking" for part in (self.shape, *self.parts.values()) for f in _fields(part))
 
 
 def _fields(cls: Any) -> tuple[dataclasses.Field, ...]:
@@ -155,7 +156,7 @@ def lobe_names(name: str) -> list[str]:
     """The lobes of a model name, covers first.
 
     Raises:
-        ModelError: a lobe is unknown; the message lists the known ones.
+        ModelError: a lobe is unknown; the message names close ones.
     """
     covers, base = _parsed(name)
     return covers + base
@@ -178,7 +179,8 @@ def _parsed(name: str) -> tuple[list[str], list[str]]:
     known = {kind: [n for n, lobe in LOBES.items() if (lobe.kind == "cover") is kind] for kind in (True, False)}
     for part in covers + parts:
         if part not in LOBES:
-            raise ModelError(f"model {name!r}: no lobe {part!r}; known lobes are {', '.join(LOBES)}.")
+            close = difflib.get_close_matches(part, LOBES) or ["lambert", "phong", "ggx"]
+            raise ModelError(f"model {name!r}: no lobe {part!r}; try {', '.join(close)}; 'fitmat models' lists all.")
     for part in covers:
         if part not in known[True]:
             raise ModelError(f"model {name!r}: {part} cannot stand over a base; {', '.join(known[True])} can.")
@@ -236,15 +238,14 @@ def _lobe(
 ) -> AbstractBRDF:
     """The lobe of that name; `inner` holds the base of a cover."""
     lobe = LOBES[name]
-    numbers = {
-        key: _number(key, values.get(f"{name}.{key}", values.get(key, default)), channels, lobe.per_channel(key))
-        for key, (_, default) in lobe.defaults().items()
-    }
+    wanted: dict[str, Any] = {key: default for key, (_, default) in lobe.defaults().items()} | values
+    wanted |= {key.removeprefix(f"{name}."): value for key, value in values.items() if key.startswith(f"{name}.")}
+    numbers = {key: _number(key, wanted[key], channels, lobe.per_channel(key)) for key in lobe.defaults()}
+    given = numbers if masking is None else numbers | {"masking": masking}
     for field, part in lobe.parts.items():
-        inner[field] = part(**{f.name: numbers.pop(f.name) for f in _fields(part) if f.name in numbers})
-    if masking is not None and lobe.has_masking:
-        inner["masking"] = masking
-    return lobe.shape(**numbers, **inner)
+        inner[field] = part(**{f.name: given[f.name] for f in _fields(part) if f.name in given})
+    own = {f.name: given[f.name] for f in _fields(lobe.shape) if f.name in given}
+    return lobe.shape(**own, **inner)
 
 
 def _number(key: str, given: ArrayLike, channels: int | None, per_channel: bool) -> Any:
