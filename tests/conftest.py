@@ -1,7 +1,8 @@
 """What every test stands on: float64, no programs cached on disk, reproducible draws, shared directions."""
 
+import gc
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -14,6 +15,15 @@ jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_enable_compilation_cache", False)
 hypothesis.settings.register_profile("fitmat", derandomize=True, deadline=None, database=None)
 hypothesis.settings.load_profile("fitmat")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _forget_programs() -> Iterator[None]:
+    """Let go of compiled programs after each file: together they need more memory maps than Linux grants a process."""
+    yield
+    jax.clear_caches()
+    gc.collect()
+
 
 Hemisphere = Callable[[int, int], np.ndarray]
 """(number, seed) → that many unit vectors above the surface, uniform in solid angle, shape (n, 3)."""
