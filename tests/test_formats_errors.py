@@ -21,7 +21,7 @@ def also(names: str, cells: str) -> str:
 
 
 BAD_FILES: dict[str, tuple[str | bytes, str]] = {
-    "empty": (b"", r"bad\.csv: the file is empty \(0 bytes\), expected a table"),
+    "empty": (b"", r"bad\.csv: the file is empty \(0 bytes\), expected measurements"),
     "blank": ("\n \n,,\n", "nothing but comments or blank lines, expected a header line"),
     "comments": ("# a\n% b\n// c\n; d\n", "nothing but comments or blank lines"),
     "header only": (HEAD, r"a header and no rows \(theta_i, theta_o, brdf\)"),
@@ -183,7 +183,7 @@ def test_bad_sources(source, message):
 
 
 def test_missing_file(tmp_path):
-    with pytest.raises(ReadError, match=r"none\.csv: no such file, expected a table of measurements"):
+    with pytest.raises(ReadError, match=r"none\.csv: no such file, expected measurements"):
         read(tmp_path / "none.csv")
 
 
@@ -199,9 +199,9 @@ def test_impossible_path(path):
 
 
 def test_unreadable_file(tmp_path, monkeypatch):
-    def refuse(path: Path) -> bytes:
+    def refuse(path: Path, mode: str) -> bytes:
         raise PermissionError(13, "Permission denied", str(path))
 
-    monkeypatch.setattr(Path, "read_bytes", refuse)
+    monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(ReadError, match=r"cannot be opened \(Permission denied\), expected a readable file"):
         read(tmp_path / "locked.csv")

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.errors import ReadError
+from fitmat.geometry import zenith
 from fitmat.lighting import PointSource
 
 QUANTITIES = {
@@ -27,10 +28,10 @@ def note(quantity: str, source: PointSource | None) -> str:
 
 def factor(
     quantity: str,
-    theta_i: Float[np.ndarray, " n"],
-    theta_o: Float[np.ndarray, " n"],
+    wi: Float[np.ndarray, "n 3"],
+    wo: Float[np.ndarray, "n 3"],
     source: PointSource | None = None,
-) -> Float[np.ndarray, " n"]:
+) -> Float[np.ndarray, "n 1"]:
     r"""What turns the quantity, and its σ, into f_r in sr⁻¹.
 
     .. math:: f_r = \mathrm{brdf} = \mathrm{brdf\_cos} / \cos\theta_o = \mathrm{reflectance\_factor} / \pi
@@ -38,21 +39,22 @@ def factor(
 
     Args:
         quantity: One of `QUANTITIES`.
-        theta_i: Zenith angles of incidence in radians, (n,).
-        theta_o: Zenith angles of reflection in radians, (n,).
+        wi: Unit vectors to the light, (n, 3).
+        wo: Unit vectors to the sensor, (n, 3).
         source: What lights the sample, for radiances.
 
     Raises:
         ReadError: a radiance without its source.
 
     Example:
-        >>> factor("reflectance_factor", np.zeros(1), np.zeros(1)).round(4)
-        array([0.3183])
+        >>> up = np.array([[0.0, 0.0, 1.0]])
+        >>> factor("reflectance_factor", up, up).round(4)
+        array([[0.3183]])
     """
     if quantity == "radiance":
         if source is None:
             expected = "expected the source beside them: intensity= in W/sr and distance= in m"
             raise ReadError(f"radiances without the light that caused them, {expected} (--intensity, --distance).")
-        return 1.0 / source.irradiance(theta_i)
-    one = np.ones_like(theta_o)
-    return {"brdf": one, "brdf_cos": one / np.cos(theta_o), "reflectance_factor": one / np.pi}[quantity]
+        return 1.0 / source.irradiance(zenith(wi))[:, None]
+    one = np.ones((len(wo), 1))
+    return {"brdf": one, "brdf_cos": one / wo[:, 2:], "reflectance_factor": one / np.pi}[quantity]

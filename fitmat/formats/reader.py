@@ -12,15 +12,18 @@ import numpy as np
 import polars as pl
 
 from fitmat.errors import ReadError
-from fitmat.formats import text
-from fitmat.formats.angles import directions
-from fitmat.formats.columns import Columns, assign
+from fitmat.formats import files, tabular, text
 from fitmat.formats.options import Options
 from fitmat.formats.quantity import factor, note
-from fitmat.formats.samples import Samples, mask, pivot
+from fitmat.formats.recording import Recording, mask
 from fitmat.formats.table import Table, from_arrays
-from fitmat.geometry import from_angles
-from fitmat.measurement import Measurements, default_channels
+from fitmat.measurement import Measurements
+
+FORMATS: tuple[Any, ...] = ()
+"""Rooms of one format each, asked in this order: `claims(head, size)` says whether a file is theirs, `load(path)` makes
+the `Recording`; what none claims is a text table."""
+
+UP = np.array([0.0, 0.0, 1.0])
 
 _DIGITS = 9
 
@@ -84,33 +87,39 @@ def read(
         array([[0.32, 0.64]])
     """
     options = Options(quantity, angle_unit, forward, specular_azimuth, intensity, distance)
-    table = _table(source)
-    layout = assign(table, columns, options.quantity)
-    samples, assumed = _samples(table, layout, options)
-    valid, masked = mask(samples)
+    recording = _recording(source, columns, options)
+    valid, masked = mask(recording)
     if not valid.any():
         listed = ", ".join(f"{count} {reason}" for reason, count in masked.items())
         expected = "expected at least one value that can be used. Check the columns and units"
-        raise ReadError(f"{table.source}: every row is masked ({listed}), {expected}.")
-    theta_i, phi_i, theta_o, phi_o = np.nan_to_num(samples.angles).T
-    scale = factor(layout.quantity, theta_i, theta_o, options.source)[:, None]
+        raise ReadError(f"{recording.source}: every row is masked ({listed}), {expected}.")
+    wi, wo = (np.where(np.isnan(w), UP, w) for w in (recording.wi, recording.wo))
+    scale = factor(recording.quantity, wi, wo, options.source)
     measured = Measurements(
-        wi=from_angles(theta_i, phi_i),
-        wo=from_angles(theta_o, phi_o),
-        value=np.where(valid, samples.value * scale, 0.0),
-        sigma=None if samples.sigma is None else np.where(valid, samples.sigma * scale, 1.0),
+        wi=wi,
+        wo=wo,
+        value=np.where(valid, recording.value * scale, 0.0),
+        sigma=None if recording.sigma is None else np.where(valid, recording.sigma * scale, 1.0),
         valid=valid,
-        channels=samples.channels,
-        source=table.source,
+        channels=recording.channels,
+        source=recording.source,
         masked=masked,
     )
-    notes = (*table.notes, note(layout.quantity, options.source), *assumed, *_oddities(measured, layout))
+    notes = (note(recording.quantity, options.source), *recording.notes, *_oddities(measured))
     return dataclasses.replace(measured, notes=notes)
 
 
-def _table(source: Source) -> Table:
-    if isinstance(source, str | os.PathLike):
-        return text.load(source)
+def _recording(source: Source, columns: str | Mapping[str, str | int] | None, options: Options) -> Recording:
+    if not isinstance(source, str | os.PathLike):
+        return tabular.recording(_table(source), columns, options)
+    head, size = files.contents(source, files.HEAD), files.size(source)
+    for layout in FORMATS:
+        if layout.claims(head, size):
+            return layout.load(source)
+    return tabular.recording(text.load(source), columns, options)
+
+
+def _table(source: Mapping[str, Any] | Frame) -> Table:
     kind = type(source).__name__
     if isinstance(source, Mapping):
         return from_arrays(source, kind)
@@ -123,50 +132,7 @@ def _table(source: Source) -> Table:
     return from_arrays(arrays, kind)
 
 
-def _samples(table: Table, layout: Columns, options: Options) -> tuple[Samples, tuple[str, ...]]:
-    """One row for each geometry and repeat, and what was assumed about the angles."""
-    angles, assumed = directions(table, layout.angles, options)
-    value = np.stack([table.numbers(column) for column in layout.values.values()], axis=1)
-    sigma = [table.numbers(column) for column in layout.sigmas.values()]
-    flagged = np.broadcast_to(_flagged(table, layout.marks)[:, None], value.shape)
-    samples = Samples(
-        angles=angles,
-        value=value,
-        sigma=np.stack(sigma, axis=1) if sigma else None,
-        flagged=flagged,
-        absent=np.zeros(value.shape, bool),
-        channels=tuple(layout.values) if any(layout.values) else default_channels(1),
-    )
-    labels = _labels(table, layout.marks)
-    return (samples if labels is None else pivot(samples, labels)), assumed
-
-
-def _flagged(table: Table, marks: Mapping[str, int]) -> np.ndarray:
-    """Rows that the file calls invalid, (n,); an empty `valid` means no, an empty `flag` not raised."""
-    flagged = np.zeros(len(table.lines), bool)
-    if "valid" in marks:
-        flagged |= ~(np.nan_to_num(table.truths(marks["valid"])) != 0)
-    if "invalid" in marks:
-        flagged |= np.nan_to_num(table.truths(marks["invalid"])) != 0
-    return flagged
-
-
-def _labels(table: Table, marks: Mapping[str, int]) -> np.ndarray | None:
-    """Channel of each row, (n,), as wavelength or as text; None where columns are channels."""
-    if "wavelength" in marks:
-        labels = table.numbers(marks["wavelength"])
-        wrong, expected = ~(np.isfinite(labels) & (labels > 0)), "a wavelength in nm"
-    elif "channel" in marks:
-        labels = table.words(marks["channel"])
-        wrong, expected = labels == "", "the name of a channel"
-    else:
-        return None
-    column = marks.get("wavelength", marks.get("channel", 0))
-    table.refuse(column, wrong, f"{expected}. Correct the cell, or put # before the line to leave it out.")
-    return labels
-
-
-def _oddities(measured: Measurements, layout: Columns) -> Iterator[str]:
+def _oddities(measured: Measurements) -> Iterator[str]:
     """What a user should know of the rows that are kept."""
     used = measured.rows(np.flatnonzero(measured.valid.any(axis=1)))
     theta_i, theta_o, phi = (np.round(angle, _DIGITS) for angle in (used.theta_i, used.theta_o, used.phi))
@@ -175,5 +141,3 @@ def _oddities(measured: Measurements, layout: Columns) -> Iterator[str]:
         yield f"Rows that repeat an earlier geometry, all kept: {repeats}."
     if negatives := np.count_nonzero(measured.value < 0):
         yield f"Negative values kept as noise: {negatives}."
-    if layout.unused:
-        yield f"Columns not used: {', '.join(layout.unused)}."

@@ -1,21 +1,17 @@
-"""Text of a table: bytes → lines → cells, whatever the encoding, delimiter, decimal mark, comments or header.
+"""Text of a table: text → lines → cells, whatever the delimiter, decimal mark, comments or header.
 
 It knows no column name and converts no number; a ragged row is refused, never repaired.
 """
 
-import codecs
 import os
 import re
-from pathlib import Path
 
 import polars as pl
 
 from fitmat.errors import ReadError
+from fitmat.formats import files
 from fitmat.formats.table import MISSING, Table
 
-_BOMS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
-_LEGACY = "cp1252"
-_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 _SPACED = re.compile(r"\d\s+[-+.]?\d")
 _COMMENT = r"^\s*(#|%|//)"
 _SEMICOLON = r"^\s*;"
@@ -33,34 +29,9 @@ def load(path: str | os.PathLike[str]) -> Table:
     Raises:
         ReadError: the file cannot be opened, is no text, or is no table of at least one row.
     """
-    try:
-        raw = Path(path).read_bytes()
-    except FileNotFoundError as error:
-        raise ReadError(f"{path}: no such file, expected a table of measurements. Check the path.") from error
-    except IsADirectoryError as error:
-        raise ReadError(f"{path}: a directory, expected a file. Name one file in it.") from error
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise ReadError(f"{path}: cannot be opened ({reason}), expected a readable file. Check its rights.") from error
-    source = Path(path).name.encode("utf-8", "replace").decode("utf-8")
-    if not raw:
-        raise ReadError(f"{source}: the file is empty (0 bytes), expected a table. Was its download cut off?")
-    text, notes = _decode(raw, source)
+    source = files.name(path)
+    text, notes = files.decoded(files.contents(path), source)
     return _parse(text, source, notes)
-
-
-def _decode(raw: bytes, source: str) -> tuple[str, tuple[str, ...]]:
-    stated = [encoding for bom, encoding in _BOMS.items() if raw.startswith(bom)]
-    for encoding in stated or ["utf-8", _LEGACY]:
-        try:
-            text = raw.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-        if _CONTROL.search(text):
-            break
-        return text, ("The file is not UTF-8; read as Windows-1252.",) if encoding == _LEGACY else ()
-    expected = "expected text: UTF-8, or UTF-16 with a byte-order mark"
-    raise ReadError(f"{source}: a binary file or an unknown encoding, {expected}. Export it as CSV.")
 
 
 def _parse(text: str, source: str, notes: tuple[str, ...]) -> Table:

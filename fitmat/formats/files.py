@@ -1,0 +1,81 @@
+"""Files: the bytes and the text of a user's file, or one sentence about why there are none.
+
+It knows no format.
+"""
+
+import codecs
+import os
+import re
+from pathlib import Path
+
+from fitmat.errors import ReadError
+
+HEAD = 65_536
+"""Bytes by which a format is recognised."""
+
+_BOMS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
+_LEGACY = "cp1252"
+_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
+
+
+def name(path: str | os.PathLike[str]) -> str:
+    """The file's name as messages show it."""
+    return Path(path).name.encode("utf-8", "replace").decode("utf-8")
+
+
+def size(path: str | os.PathLike[str]) -> int:
+    """Bytes in the file.
+
+    Raises:
+        ReadError: it cannot be opened, or it is empty.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            count = file.seek(0, os.SEEK_END)
+    except (OSError, ValueError) as error:
+        raise _unopened(path, error) from error
+    if not count:
+        raise ReadError(f"{name(path)}: the file is empty (0 bytes), expected measurements. Was its download cut off?")
+    return count
+
+
+def contents(path: str | os.PathLike[str], first: int = -1) -> bytes:
+    """All bytes of a file, or its first ones.
+
+    Raises:
+        ReadError: it cannot be opened, or it is empty.
+    """
+    size(path)
+    try:
+        with Path(path).open("rb") as file:
+            return file.read(first)
+    except OSError as error:
+        raise _unopened(path, error) from error
+
+
+def _unopened(path: str | os.PathLike[str], error: Exception) -> ReadError:
+    if isinstance(error, FileNotFoundError):
+        return ReadError(f"{path}: no such file, expected measurements. Check the path.")
+    if isinstance(error, IsADirectoryError):
+        return ReadError(f"{path}: a directory, expected a file. Name one file in it.")
+    reason = getattr(error, "strerror", None) or error
+    return ReadError(f"{path}: cannot be opened ({reason}), expected a readable file. Check its rights.")
+
+
+def decoded(raw: bytes, source: str) -> tuple[str, tuple[str, ...]]:
+    """Bytes as text, and a note where the encoding had to be guessed.
+
+    Raises:
+        ReadError: they are no text.
+    """
+    stated = [encoding for bom, encoding in _BOMS.items() if raw.startswith(bom)]
+    for encoding in stated or ["utf-8", _LEGACY]:
+        try:
+            text = raw.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        if _CONTROL.search(text):
+            break
+        return text, ("The file is not UTF-8; read as Windows-1252.",) if encoding == _LEGACY else ()
+    expected = "expected text (UTF-8, or UTF-16 with a byte-order mark) or a format that fitmat knows"
+    raise ReadError(f"{source}: a binary file or an unknown encoding, {expected}. Export it as CSV.")
