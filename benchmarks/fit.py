@@ -19,9 +19,9 @@ from peer import Problem, from_sine
 
 import fitmat as fm
 from fitmat.fitting import Chart, descend
-from fitmat.instrument import noise
 from fitmat.likelihood import Data, first_discrepancy, prepare
 from fitmat.measurement import Measurements
+from fitmat.noise import measured_noise
 from fitmat.params import space, vector
 from fitmat.solver import Minimum
 
@@ -94,7 +94,7 @@ def main() -> None:
 def race(rows: int, repeats: int, *, whole: bool) -> None:
     """Both fits of `rows` samples, in turn."""
     m = measured(rows)
-    data = prepare(m, noise(m))
+    data = prepare(m, measured_noise(m))
     s = first_discrepancy(data)
     template = fm.model("lambert+ggx", channels=1, **START)
     start = np.asarray(space(template).to_free(vector(template)))

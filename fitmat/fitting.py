@@ -14,7 +14,6 @@ from jaxtyping import Array, ArrayLike
 
 from fitmat.brdf import AbstractBRDF, evaluate_pairs, model
 from fitmat.errors import FitmatError, ModelError
-from fitmat.instrument import noise
 from fitmat.likelihood import (
     Data,
     best_discrepancy,
@@ -26,6 +25,7 @@ from fitmat.likelihood import (
     stabilised,
 )
 from fitmat.measurement import Measurements
+from fitmat.noise import measured_noise
 from fitmat.outcome import Ends, Fit, conclude, free_places
 from fitmat.params import Space, check_range, entries, space, vector, with_vector
 from fitmat.solver import Minimum, Units, least_squares
@@ -90,7 +90,7 @@ def fit(
             f"{measurements.source}: {measurements.n_valid} valid samples, but {template.name} has {len(free)} free "
             f"parameters and needs at least {needed}; measure more angles or fix parameters (--fix ks=1)."
         )
-    found_noise = noise(measurements)
+    found_noise = measured_noise(measurements)
     data = prepare(measurements, found_noise)
     first = first_discrepancy(data)
     starts = starting_points(template, data, first, held, STARTS)

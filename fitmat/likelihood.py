@@ -24,8 +24,8 @@ from jaxtyping import Array, Float
 
 from fitmat._types import Directions, Samples, Scalar
 from fitmat.brdf import AbstractBRDF, evaluate_pairs, padded_length
-from fitmat.instrument import Noise
 from fitmat.measurement import Measurements
+from fitmat.noise import Noise
 
 
 def _near_shape() -> np.ndarray:

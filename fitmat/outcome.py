@@ -15,9 +15,9 @@ from jaxtyping import Array, Float
 
 from fitmat.brdf import AbstractBRDF
 from fitmat.display import html_table, text_table, with_error
-from fitmat.instrument import Noise
 from fitmat.likelihood import Data, noise_scale, residuals
 from fitmat.measurement import Measurements
+from fitmat.noise import Noise
 from fitmat.params import Entry, entries, space, vector, with_vector
 
 AGREE = 0.1

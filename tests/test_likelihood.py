@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from scipy import integrate, optimize, stats
 
 import fitmat as fm
-from fitmat.instrument import Noise
 from fitmat.likelihood import (
     NEGLIGIBLE,
     Data,
@@ -28,6 +27,7 @@ from fitmat.likelihood import (
     spread,
     stabilised,
 )
+from fitmat.noise import Noise
 
 QUADRATURE = 1e-9
 """Relative; quad is asked for 1e-11."""

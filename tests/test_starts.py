@@ -10,8 +10,8 @@ from hypothesis.extra import numpy as hnp
 from scipy.optimize import nnls
 
 import fitmat as fm
-from fitmat.instrument import noise
 from fitmat.likelihood import Data, prepare
+from fitmat.noise import measured_noise
 from fitmat.params import entries
 from fitmat.starts import nonnegative, starting_points
 
@@ -54,7 +54,7 @@ def test_weights_are_scipys_where_they_are_unique(seed: int) -> None:
 def data() -> Data:
     truth, theta_o = fm.model("lambert+ggx", kd=0.3, alpha=0.15, eta=1.5), np.deg2rad(np.arange(-80, 81, 10))
     m = fm.simulate(truth, np.deg2rad([20, 45, 70]), theta_o, relative_noise=0.01, absolute_noise=1e-3, seed=1)
-    return prepare(m, noise(m))
+    return prepare(m, measured_noise(m))
 
 
 def test_the_grid_comes_near_the_truth(data: Data) -> None:

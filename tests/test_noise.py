@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import fitmat as fm
-from fitmat.instrument import MIN_RESIDUALS, UNKNOWN_RELATIVE, noise
+from fitmat.noise import MIN_RESIDUALS, UNKNOWN_RELATIVE, measured_noise
 
 SEEDS = 20
 
@@ -35,7 +35,7 @@ def smooth(relative: float, absolute: float, seed: int, repeats: int = 1) -> fm.
 
 def found(m: fm.Measurements) -> tuple[float, float]:
     """a (sr⁻¹) and b (fraction) out of the sentence for the report."""
-    match = re.fullmatch(r"Noise estimated from neighbouring angles: (\S+) % \+ (\S+) sr⁻¹\.", noise(m).words)
+    match = re.fullmatch(r"Noise estimated from neighbouring angles: (\S+) % \+ (\S+) sr⁻¹\.", measured_noise(m).words)
     assert match is not None
     return float(match[2]), float(match[1]) / 100
 
@@ -54,7 +54,10 @@ def test_planted_noise_is_found(relative: float, absolute: float, repeats: int) 
 def test_purely_relative_and_purely_absolute_noise() -> None:
     for relative, absolute in ((0.03, 0.0), (0.0, 0.03)):
         m = smooth(relative, absolute, 1)
-        estimated, true = noise(m).sigma[:, 0], np.hypot(absolute, relative * np.exp(3 * np.cos(2 * m.theta_o)))
+        estimated, true = (
+            measured_noise(m).sigma[:, 0],
+            np.hypot(absolute, relative * np.exp(3 * np.cos(2 * m.theta_o))),
+        )
         assert np.median(estimated / true) == pytest.approx(1.0, abs=FOUR * STATED)
 
 
@@ -63,7 +66,7 @@ def test_sigma_depends_on_the_neighbours_not_on_the_sample() -> None:
     m = smooth(0.02, 0.005, 1)
     raised = m.value.copy()
     raised[80] *= 1.05
-    before, after = noise(m), noise(dataclasses.replace(m, value=raised))
+    before, after = measured_noise(m), measured_noise(dataclasses.replace(m, value=raised))
     assert after.sigma[80] == pytest.approx(before.sigma[80], rel=0.02)  # a and b move by one error in 640
 
 
@@ -73,7 +76,7 @@ def test_sharp_peaks_are_not_noise(alpha: float) -> None:
     truth = fm.model("lambert+ggx", kd=0.3, alpha=alpha, eta=1.5)
     m = fm.simulate(truth, np.deg2rad([10, 30, 50, 70]), ANGLES, relative_noise=0.02, absolute_noise=2e-3, seed=1)
     assert m.sigma is not None
-    estimated = noise(dataclasses.replace(m, sigma=None)).sigma
+    estimated = measured_noise(dataclasses.replace(m, sigma=None)).sigma
     floor = np.abs(m.theta_o - m.theta_i) > 0.5
     assert np.median((estimated / m.sigma)[floor]) == pytest.approx(1.0, abs=FOUR * STATED)
     assert (estimated / m.sigma)[floor].max() < INFLATED
@@ -82,8 +85,8 @@ def test_sharp_peaks_are_not_noise(alpha: float) -> None:
 def test_each_channel_has_its_own_noise() -> None:
     one, two = smooth(0.01, 0.005, 1), smooth(0.05, 0.005, 2)
     both = fm.from_arrays(one.theta_i, one.signed_theta_o, np.column_stack([one.value, two.value]), channels=("x", "y"))
-    estimated = noise(both)
-    np.testing.assert_allclose(estimated.sigma, np.column_stack([noise(one).sigma, noise(two).sigma]))
+    estimated = measured_noise(both)
+    np.testing.assert_allclose(estimated.sigma, np.column_stack([measured_noise(one).sigma, measured_noise(two).sigma]))
     assert re.search(r"sr⁻¹ \(x\); .* sr⁻¹ \(y\)\.$", estimated.words)
 
 
@@ -91,7 +94,7 @@ def test_each_channel_has_its_own_noise() -> None:
 def test_too_few_neighbours_are_said(count: int) -> None:
     """A curve of k angles has k − 4 samples with two neighbours on either side."""
     theta_o = np.linspace(-1.2, 1.2, count)
-    estimated = noise(fm.from_arrays(0.5, theta_o, 0.1 + 0.01 * theta_o))
+    estimated = measured_noise(fm.from_arrays(0.5, theta_o, 0.1 + 0.01 * theta_o))
     assert not estimated.known
     assert estimated.words.startswith("Noise unknown: too few repeats or neighbouring angles")
     assert (estimated.sigma > 0).all()
@@ -101,12 +104,12 @@ def test_too_few_neighbours_are_said(count: int) -> None:
 def test_enough_neighbours_are_used() -> None:
     theta_o = np.linspace(-1.2, 1.2, MIN_RESIDUALS + 4)
     value = 0.1 * (1 + 0.02 * np.random.default_rng(1).normal(size=theta_o.shape))
-    assert noise(fm.from_arrays(0.5, theta_o, value)).known
+    assert measured_noise(fm.from_arrays(0.5, theta_o, value)).known
 
 
 def test_given_sigma_is_kept() -> None:
     sigma = np.array([0.1, 0.2, np.nan, 0.4])
-    estimated = noise(fm.from_arrays(0.5, np.array([0.1, 0.2, 0.3, 0.4]), np.ones(4), sigma=sigma))
+    estimated = measured_noise(fm.from_arrays(0.5, np.array([0.1, 0.2, 0.3, 0.4]), np.ones(4), sigma=sigma))
     assert estimated.known
     assert estimated.words == "Measurement noise as given in the file."
     np.testing.assert_array_equal(estimated.sigma, [[0.1], [0.2], [1.0], [0.4]])  # 1 where masked, never used
@@ -115,6 +118,6 @@ def test_given_sigma_is_kept() -> None:
 @pytest.mark.parametrize("value", [0.0, 0.25])
 def test_exact_and_constant_data_have_finite_noise(value: float) -> None:
     """Every error is 0, and so is the level for black."""
-    estimated = noise(fm.from_arrays(0.5, ANGLES, np.full(ANGLES.shape, value)))
+    estimated = measured_noise(fm.from_arrays(0.5, ANGLES, np.full(ANGLES.shape, value)))
     assert np.isfinite(estimated.sigma).all()
     assert (estimated.sigma > 0).all()

@@ -1,4 +1,4 @@
-"""The instrument's noise, estimated from the scatter of repeats and of neighbouring angles.
+"""Noise of the measurements, estimated from the scatter of repeats and of neighbouring angles.
 
 The estimate looks at the data only, never at a model.
 """
@@ -41,7 +41,7 @@ class Noise:
     words: str
 
 
-def noise(m: Measurements) -> Noise:
+def measured_noise(m: Measurements) -> Noise:
     """The given σ, or an estimate per channel from repeats and neighbouring angles.
 
     Neighbours: each sample is predicted from two neighbours on either side in its own curve (same incidence, same
