@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.brdf import LOBES, AbstractBRDF, lobe_names
+from fitmat.brdf import LOBES, AbstractBRDF, lobe_names, surface
 from fitmat.errors import FitmatError
 from fitmat.measurement import Measurements
 from fitmat.params import with_vector
@@ -174,7 +174,7 @@ def compare(one: Posterior, other: Posterior) -> Comparison:
     if one.fit.measurements is not other.fit.measurements:
         raise FitmatError("compare needs two fits to the same Measurements object.")
     fits = empirical.fit, microfacet.fit
-    draws = [np.vstack([p.fit.values, p.thinned(DRAWS)[0]]) for p in (empirical, microfacet)]
+    draws = [np.vstack([p.fit.values, _by_scale(p)]) for p in (empirical, microfacet)]
     count = min(len(d) for d in draws)
     angles = jnp.asarray(_incidences(fits[0].measurements))
     pairs = jnp.asarray(draws[0][:count]), jnp.asarray(draws[1][:count])
@@ -199,6 +199,13 @@ def compare(one: Posterior, other: Posterior) -> Comparison:
         albedo_empirical=_band(albedo_p),
         albedo_microfacet=_band(albedo_m),
     )
+
+
+def _by_scale(posterior: Posterior) -> np.ndarray:
+    """Draws in the order of the shared scale, which has one true value for both models; else as they come."""
+    values = posterior.thinned(DRAWS)[0]
+    place = next((e.place for e in posterior.fit.entries if e.name == "scale"), None)
+    return values if place is None else values[np.argsort(values[:, place.start])]
 
 
 def _estimate(values: np.ndarray) -> Estimate:
@@ -235,7 +242,7 @@ def _distances(
     hemisphere, measured = slice(0, len(theta)), slice(len(theta), len(theta) + len(angles))
     albedo = slice(len(theta) + len(angles), None)
 
-    isotropic = empirical.isotropic and microfacet.isotropic
+    isotropic = surface(empirical).isotropic and surface(microfacet).isotropic
     turns = jnp.zeros(1) if isotropic else (jnp.arange(AZIMUTHS) + 0.5) * jnp.pi / AZIMUTHS
 
     def at(theta_i: Array, phi_i: Array, p: AbstractBRDF, m: AbstractBRDF) -> tuple[Array, ...]:
@@ -250,7 +257,7 @@ def _distances(
         return difference, square, root, jnp.sum(solid), one, other
 
     def pair(both: tuple[Array, Array]) -> tuple[Array, Array, Array, Array, Array]:
-        p, m = with_vector(empirical, both[0]), with_vector(microfacet, both[1])
+        p, m = (surface(with_vector(f, v)) for f, v in zip((empirical, microfacet), both, strict=True))
         every = jax.vmap(lambda turn: jax.vmap(lambda t: at(t, turn, p, m))(nodes))(turns)
         difference, square, roots, solid, one, other = (part.mean(axis=0) for part in every)
         flat, cosines = weight / jnp.cos(theta), jnp.cos(angles)

@@ -12,16 +12,18 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, ArrayLike
 
-from fitmat.brdf import AbstractBRDF, evaluate_pairs, model
+from fitmat.brdf import AbstractBRDF, Seen, evaluate_pairs, model
 from fitmat.errors import FitmatError, ModelError
+from fitmat.instrument import Instrument
 from fitmat.likelihood import (
     Data,
+    Prior,
     best_discrepancy,
+    every_residual,
     first_discrepancy,
-    log_likelihood,
+    log_density,
     mapped,
     prepare,
-    residuals_from,
     stabilised,
 )
 from fitmat.measurement import Measurements
@@ -82,8 +84,10 @@ def fit(
         )
     channels = len(measurements.channels)
     template = model(to, channels=channels, masking=masking) if isinstance(to, str) else to
-    held = _held(template, fixed or {})
-    free = free_places(template, held)
+    instrument = measurements.instrument
+    shown = template if instrument.ideal else Seen(template, instrument)
+    held = _held(shown, {**_calibrated(shown, instrument), **(fixed or {})})
+    free = free_places(shown, held)
     needed = len(free) + 2
     if measurements.n_valid < needed:
         raise FitmatError(
@@ -91,11 +95,38 @@ def fit(
             f"parameters and needs at least {needed}; measure more angles or fix parameters (--fix ks=1)."
         )
     found_noise = measured_noise(measurements)
-    data = prepare(measurements, found_noise)
+    data = prepare(measurements, found_noise, _prior(shown, instrument))
     first = first_discrepancy(data)
     starts = starting_points(template, data, first, held, STARTS)
-    ends = jax.device_get(_refine(template, data, jnp.asarray(starts), first, tuple(int(k) for k in free), max_steps))
-    return conclude(measurements, template, held, (found_noise, data), ends)
+    if shown is not template:
+        added = np.array([1.0, _first_dark(measurements) if instrument.dark is None else instrument.dark])
+        starts = np.column_stack([starts, np.tile(added, (len(starts), 1))])
+    ends = jax.device_get(_refine(shown, data, jnp.asarray(starts), first, tuple(int(k) for k in free), max_steps))
+    return conclude(measurements, shown, held, (found_noise, data), ends)
+
+
+def _calibrated(shown: AbstractBRDF, instrument: Instrument) -> dict[str, float]:
+    """What of an instrument is known exactly, by the name of its parameter in `Seen`."""
+    if not isinstance(shown, Seen):
+        return {}
+    scale = {} if instrument.calibration else {"scale": 1.0}
+    return scale if instrument.dark is None else scale | {"dark": instrument.dark}
+
+
+def _prior(shown: AbstractBRDF, instrument: Instrument) -> Prior | None:
+    """ln g ~ N(0, calibration²); everything else flat."""
+    if not instrument.calibration:
+        return None
+    places = {e.name: e.place for e in entries(shown)}
+    precision = np.zeros(len(vector(shown)))
+    precision[places["scale"]] = 1.0 / instrument.calibration
+    return Prior(jnp.zeros(len(precision)), jnp.asarray(precision))
+
+
+def _first_dark(m: Measurements) -> float:
+    """Half of what the darkest hundredth of the values reaches, in units of f_r cosθ_o."""
+    dark = np.quantile((m.value * m.wo[:, 2:])[m.valid], 0.01)
+    return float(np.clip(0.5 * dark, 1e-6, 0.5))
 
 
 def _held(template: AbstractBRDF, fixed: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
@@ -140,7 +171,7 @@ def _refine(
     def one(base: Array) -> Ends:
         u, s, settled, solved, steps, _ = settle(data, base, chart.free(base), first)
         best = chart.model(base, u)
-        return Ends(vector(best), s, log_likelihood(best, data, s), settled & solved, steps)
+        return Ends(vector(best), s, log_density(best, data, s), settled & solved, steps)
 
     return mapped(one, starts)
 
@@ -181,7 +212,7 @@ def descend(chart: Chart, data: Data, values: Array, u: Array, s: Array, *, max_
 
     def residual(u: Array, args: tuple[Data, Array, Array, Array]) -> Array:
         data, values, s, measured = args
-        return residuals_from(measured, chart.model(values, u), data, s)
+        return every_residual(chart.model(values, u), data, s, measured)
 
     def minimum(data: Data, u: Array, units: Units | None) -> Minimum:
         measured = stabilised(data.x, data.noise, s)
@@ -191,6 +222,6 @@ def descend(chart: Chart, data: Data, values: Array, u: Array, s: Array, *, max_
     if rows <= MANY_ROWS:
         return minimum(data, u, None)
     stride = rows // (MANY_ROWS // 2)
-    coarse = minimum(jax.tree.map(lambda part: part[::stride], data), u, None)
+    coarse = minimum(data.every(stride), u, None)
     # So close to the end hardly any damping is needed: λ is relative to the square of the unit.
     return minimum(data, coarse.x, Units(coarse.units.x * LITTLE_DAMPING**-0.5, coarse.units.residual * stride**0.5))

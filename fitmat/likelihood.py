@@ -26,6 +26,7 @@ from fitmat._types import Directions, Samples, Scalar
 from fitmat.brdf import AbstractBRDF, evaluate_pairs, padded_length
 from fitmat.measurement import Measurements
 from fitmat.noise import Noise
+from fitmat.params import space, vector
 
 
 def _near_shape() -> np.ndarray:
@@ -46,6 +47,18 @@ def _near_shape() -> np.ndarray:
 _NEAR = _near_shape()
 
 
+class Prior(eqx.Module):
+    """What is known of the parameters beside the bounds: Gaussians in their natural coordinates.
+
+    Attributes:
+        mean: Of each coordinate, (p,).
+        precision: 1/sd of each coordinate, (p,); 0 where the prior is flat.
+    """
+
+    mean: Float[Array, " p"]
+    precision: Float[Array, " p"]
+
+
 class Data(eqx.Module):
     """Samples as the likelihood sees them; masked values and filling rows have weight 0.
 
@@ -56,6 +69,7 @@ class Data(eqx.Module):
         noise: σ cosθ_i, (n, c), positive.
         kappa: cosθ_i, (n, 1).
         weight: 1 where valid, 0 where masked, (n, c).
+        prior: Of the model's parameters; None where it is flat.
     """
 
     wi: Directions
@@ -64,9 +78,15 @@ class Data(eqx.Module):
     noise: Samples
     kappa: Float[Array, "n 1"]
     weight: Samples
+    prior: Prior | None = None
+
+    def every(self, stride: int) -> "Data":
+        """Each stride-th row, under the same prior."""
+        arrays = (self.wi, self.wo, self.x, self.noise, self.kappa, self.weight)
+        return Data(*(part[::stride] for part in arrays), self.prior)
 
 
-def prepare(m: Measurements, noise: Noise) -> Data:
+def prepare(m: Measurements, noise: Noise, prior: Prior | None = None) -> Data:
     """Measurements and their noise, ready for the likelihood.
 
     Rows with nothing valid are left out; rows of weight 0 fill up to `padded_length`, so that files of similar size
@@ -77,7 +97,7 @@ def prepare(m: Measurements, noise: Noise) -> Data:
     kappa = m.wi[:, 2:3]
     parts = (m.wi, m.wo, m.value * kappa, sigma * kappa, kappa, m.valid.astype(float))
     extra = padded_length(len(kappa)) - len(kappa)
-    return Data(*(jnp.asarray(_padded(part, extra, fill)) for part, fill in zip(parts, _FILL, strict=True)))
+    return Data(*(jnp.asarray(_padded(part, extra, fill)) for part, fill in zip(parts, _FILL, strict=True)), prior)
 
 
 _FILL = ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 0.0, 1.0, 1.0, 0.0)
@@ -173,6 +193,33 @@ def residuals_from(measured: Samples, model: AbstractBRDF, data: Data, s: Scalar
     """`residuals` with z(y κ) given, for loops in which s stays."""
     predicted = evaluate_pairs(model, data.wi, data.wo) * data.kappa
     return data.weight * (measured - stabilised(predicted, data.noise, s))
+
+
+def prior_residuals(model: AbstractBRDF, data: Data) -> Float[Array, " p"]:
+    """How many prior standard deviations each parameter is from its prior mean; (0,) where the prior is flat."""
+    if data.prior is None:
+        return jnp.zeros(0)
+    return data.prior.precision * (space(model).natural(vector(model)) - data.prior.mean)
+
+
+def every_residual(model: AbstractBRDF, data: Data, s: Scalar, measured: Samples | None = None) -> Float[Array, " r"]:
+    """`residuals` and `prior_residuals` as one vector, what least squares minimises.
+
+    Args:
+        model: Where to evaluate.
+        data: The samples.
+        s: Discrepancy.
+        measured: z(y κ), for loops in which s stays.
+    """
+    measured = stabilised(data.x, data.noise, s) if measured is None else measured
+    samples = residuals_from(measured, model, data, s).ravel()
+    return samples if data.prior is None else jnp.concatenate([samples, prior_residuals(model, data)])
+
+
+def log_density(model: AbstractBRDF, data: Data, s: Scalar) -> Scalar:
+    """`log_likelihood` and the log prior density, up to the prior's constant."""
+    apart = prior_residuals(model, data)
+    return log_likelihood(model, data, s) - 0.5 * jnp.vdot(apart, apart)
 
 
 def log_likelihood(model: AbstractBRDF, data: Data, s: Scalar) -> Scalar:

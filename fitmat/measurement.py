@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from fitmat.errors import ReadError
 from fitmat.geometry import from_angles, relative_azimuth, signed_zenith, zenith
+from fitmat.instrument import IDEAL, Instrument
 
 IN_PLANE = np.deg2rad(0.5)
 """A sample whose azimuth is within this angle of the plane of incidence counts as in-plane."""
@@ -31,6 +32,7 @@ class Measurements:
         source: Where it came from, for messages and titles.
         masked: Reason → number of rows masked for it.
         notes: Plain sentences: factors applied, conventions assumed, oddities kept.
+        instrument: What the values owe to the instrument that took them.
     """
 
     wi: Float[np.ndarray, "n 3"]
@@ -42,6 +44,7 @@ class Measurements:
     source: str = "array"
     masked: dict[str, int] = dataclasses.field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    instrument: Instrument = IDEAL
 
     @property
     def n_samples(self) -> int:
@@ -109,7 +112,7 @@ class Measurements:
             f"incidence {listed}; sigma {'given' if self.sigma is not None else 'not given'}",
         ]
         lines += [f"{count} masked: {reason}" for reason, count in self.masked.items()]
-        return "\n".join(lines + list(self.notes))
+        return "\n".join([*lines, *self.notes, *filter(None, [str(self.instrument)])])
 
 
 def from_arrays(
@@ -122,6 +125,7 @@ def from_arrays(
     sigma: ArrayLike | None = None,
     channels: tuple[str, ...] | None = None,
     source: str = "array",
+    instrument: Instrument = IDEAL,
 ) -> Measurements:
     """Measurements from angles in **radians** and BRDF values in sr⁻¹, for use in a notebook or a simulation.
 
@@ -134,6 +138,7 @@ def from_arrays(
         sigma: Standard deviation of the noise, shape of `value`.
         channels: Names of the c columns.
         source: Title for messages.
+        instrument: What took them.
 
     Raises:
         ReadError: lengths differ.
@@ -159,7 +164,15 @@ def from_arrays(
         valid = valid & np.isfinite(sigma) & (sigma > 0)
     masked = {"not finite, no positive sigma, or below the horizon": int((~valid.all(1)).sum())}
     return Measurements(
-        wi, wo, np.where(valid, value, 0.0), sigma, valid, channels, source, {k: v for k, v in masked.items() if v}
+        wi=wi,
+        wo=wo,
+        value=np.where(valid, value, 0.0),
+        sigma=sigma,
+        valid=valid,
+        channels=channels,
+        source=source,
+        masked={reason: count for reason, count in masked.items() if count},
+        instrument=instrument,
     )
 
 

@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 
 from fitmat.brdf import AbstractBRDF
 from fitmat.display import html_table, text_table, with_error
-from fitmat.likelihood import Data, noise_scale, residuals
+from fitmat.likelihood import Data, every_residual, noise_scale
 from fitmat.measurement import Measurements
 from fitmat.noise import Noise
 from fitmat.params import Entry, entries, space, vector, with_vector
@@ -59,7 +59,7 @@ class Fit:
         steps: Levenberg–Marquardt iterations of the best start.
         n_starts: How many starts were refined.
         n_starts_agreeing: How many of them found the best optimum.
-        log_likelihood: At the optimum.
+        log_likelihood: At the optimum, what the prior adds included.
         information: Of the natural coordinates (logarithm where the scale is log), (p, p).
         covariance: Of all physical parameters, (p, p); 0 for fixed ones, NaN for those on a bound.
         undetermined: Names of parameters that these data do not determine.
@@ -222,7 +222,7 @@ def _cost_terms(best: AbstractBRDF, data: Data, s: Array) -> tuple[Callable[[Arr
     """The residuals as a function of the natural coordinates, and those of `best`."""
     coordinates = space(best)
     at = coordinates.natural(vector(best))
-    return lambda t: residuals(with_vector(best, coordinates.physical(t)), data, s).ravel(), at
+    return lambda t: every_residual(with_vector(best, coordinates.physical(t)), data, s), at
 
 
 @eqx.filter_jit

@@ -39,7 +39,7 @@ def starting_points(
     """
     every = entries(model)
     stride = max(1, -(-data.x.shape[0] // MAX_ROWS))
-    thinned = jax.tree.map(lambda a: a[::stride], data)
+    thinned = data.every(stride)
     free = [e for e in every if e.name not in held]
     nodes = np.array(_nodes(model, [e for e in free if not e.param.weight], held), float)
     weights = np.concatenate([np.arange(e.place.start, e.place.stop) for e in free if e.param.weight] or [[]])

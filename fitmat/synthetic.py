@@ -3,16 +3,18 @@
 It fits nothing and reads no file; what it writes, `fitmat.formats.read` reads.
 """
 
+import dataclasses
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fitmat.brdf import AbstractBRDF, evaluate
+from fitmat.brdf import AbstractBRDF, Seen, evaluate
 from fitmat.errors import FitmatError, ModelError
 from fitmat.folder import write_text
 from fitmat.geometry import from_angles
+from fitmat.instrument import IDEAL, Instrument
 from fitmat.measurement import Measurements, from_arrays
 from fitmat.params import vector
 
@@ -32,6 +34,7 @@ def simulate(
     phi_i: ArrayLike = 0.0,
     channels: tuple[str, ...] | None = None,
     give_sigma: bool = True,
+    instrument: Instrument = IDEAL,
 ) -> Measurements:
     """Measure a model at every combination of angles, in radians; BRDF in sr⁻¹ without cosine.
 
@@ -49,6 +52,8 @@ def simulate(
         phi_i: Azimuths of incidence, (d,) or one; of consequence for anisotropic and tilted samples only.
         channels: Names of the c channels.
         give_sigma: Whether the measurements know their σ; never where there is no noise.
+        instrument: What shows the surface. Its calibration error is drawn once, from
+            ln g ~ N(0, calibration²); a dark signal that is to be fitted must be given a value.
 
     Returns:
         n = d·a·c·b samples, theta_o running fastest; a sample of σ = 0 among others is masked.
@@ -73,15 +78,19 @@ def simulate(
     for name, noise in {"relative_noise": relative_noise, "absolute_noise": absolute_noise}.items():
         _refuse_outside(name, noise, np.inf, "a finite number of at least 0")
     wi, wo = from_angles(light, turn), from_angles(np.abs(sensor), turn + relative + np.where(sensor < 0, np.pi, 0.0))
-    exact = evaluate(truth, wi, wo)
+    rng = np.random.default_rng(seed)
+    scale = np.exp(instrument.calibration * rng.normal()) if instrument.calibration else 1.0
+    shown = truth if instrument.ideal else Seen(truth, instrument, scale=scale, dark=instrument.dark)
+    exact = evaluate(shown, wi, wo)
     if channels is not None and len(channels) != exact.shape[1]:
         raise ModelError(f"{len(channels)} channel names, expected {exact.shape[1]}, one for each of the model's.")
     sigma = np.hypot(absolute_noise, relative_noise * exact)
-    value = exact + sigma * np.random.default_rng(seed).normal(size=exact.shape)
+    value = exact + sigma * rng.normal(size=exact.shape)
     given = sigma if give_sigma and relative_noise + absolute_noise > 0 else None
     source = f"simulated {truth.name}"
     azimuths = {"phi": relative, "phi_i": turn}
-    return from_arrays(light, sensor, value, **azimuths, sigma=given, channels=channels, source=source)
+    measured = from_arrays(light, sensor, value, **azimuths, sigma=given, channels=channels, source=source)
+    return dataclasses.replace(measured, instrument=instrument)
 
 
 def _refuse_single_precision(truth: AbstractBRDF) -> None:

@@ -16,9 +16,10 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat import fitting
+from fitmat.apparent import Apparent, apparent
 from fitmat.brdf import AbstractBRDF
 from fitmat.errors import FitmatError
-from fitmat.likelihood import Data, log_likelihood, mapped, noise_scale
+from fitmat.likelihood import Data, log_density, mapped, noise_scale
 from fitmat.measurement import Measurements
 from fitmat.outcome import Fit, inverse_information
 from fitmat.params import space, vector, with_vector
@@ -51,8 +52,7 @@ def laplace(fit: Fit, *, seed: int) -> Posterior:
     """
     if not fit.finite:
         return Posterior(fit, "laplace", fit.values[None], np.array([fit.discrepancy]))
-    natural = _laplace_draws(fit, LAPLACE_DRAWS, np.random.default_rng(seed))
-    values, discrepancy = _physical(fit, natural)
+    values, discrepancy = _physical(fit, _laplace_draws(fit, LAPLACE_DRAWS, np.random.default_rng(seed)))
     return Posterior(fit, "laplace", values, discrepancy)
 
 
@@ -168,7 +168,7 @@ def default_walkers(fit: Fit) -> int:
 
 
 def log_posterior(fit: Fit, batch: int = 1) -> Callable[[np.ndarray], np.ndarray]:
-    """The log posterior density over (w, free + 1) natural coordinates as one compiled call; −inf outside.
+    """The log posterior density over (w, free + 1) sampled coordinates as one compiled call; −inf outside.
 
     Args:
         fit: What is sampled.
@@ -177,30 +177,33 @@ def log_posterior(fit: Fit, batch: int = 1) -> Callable[[np.ndarray], np.ndarray
     free = tuple(int(k) for k in fit.free)
     arrays, static = eqx.partition((fit.model, fit.data), eqx.is_array)
 
+    where = apparent(fit)
+
     def call(coordinates: np.ndarray) -> np.ndarray:
         filled = np.pad(coordinates, ((0, max(0, batch - len(coordinates))), (0, 0)), mode="edge")
-        return np.asarray(_log_posterior(arrays, static, free, jnp.asarray(filled)))[: len(coordinates)]
+        return np.asarray(_log_posterior(arrays, static, free, where, jnp.asarray(filled)))[: len(coordinates)]
 
     return call
 
 
 @eqx.filter_jit
-def _log_posterior(arrays: Any, static: Any, free: tuple[int, ...], coordinates: Array) -> Array:
+def _log_posterior(arrays: Any, static: Any, free: tuple[int, ...], where: Apparent, coordinates: Array) -> Array:
     template, data = eqx.combine(arrays, static)
-    return mapped(lambda x: _log_density(template, data, free, x), coordinates)
+    return mapped(lambda x: _log_density(template, data, free, where, x), coordinates)
 
 
-def _log_density(template: AbstractBRDF, data: Data, free: tuple[int, ...], x: Array) -> Array:
+def _log_density(template: AbstractBRDF, data: Data, free: tuple[int, ...], where: Apparent, x: Array) -> Array:
     whole, places = space(template), np.array(free, int)
-    t, s = x[:-1], x[-1]
+    natural, change = where.natural(x)
+    t, s = natural[:-1], natural[-1]
     inside = jnp.all((t >= whole.natural_lower[places]) & (t <= whole.natural_upper[places])) & (s >= 0.0)
     full = whole.natural(vector(template)).at[places].set(jnp.where(inside, t, whole.natural_lower[places]))
-    value = log_likelihood(with_vector(template, whole.physical(full)), data, jnp.abs(s))
-    return jnp.where(inside & jnp.isfinite(value), value, -jnp.inf)
+    value = log_density(with_vector(template, whole.physical(full)), data, jnp.abs(s))
+    return jnp.where(inside & jnp.isfinite(value), value + change, -jnp.inf)
 
 
 def _laplace_gaussian(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and covariance of the free natural coordinates and s."""
+    """Mean and covariance of the sampled coordinates: the free natural ones, `apparent` weights, and s."""
     whole, free = space(fit.model), fit.free
     span = (whole.natural_upper - whole.natural_lower)[free]
     centre = np.append(whole.natural_array(fit.values)[free], fit.discrepancy)
@@ -209,17 +212,17 @@ def _laplace_gaussian(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     information = fit.information[np.ix_(free, free)] + np.diag(12.0 / span**2)
     covariance[:-1, :-1] = inverse_information(information, span)
     covariance[-1, -1] = _discrepancy_sd(fit) ** 2
-    return centre, covariance
+    return apparent(fit).gaussian(centre, covariance)
 
 
 def _laplace_draws(fit: Fit, count: int, rng: np.random.Generator) -> Float[np.ndarray, "count d"]:
-    """Gaussian draws of the free natural coordinates and s, folded at the bounds."""
-    whole, free = space(fit.model), fit.free
+    """Gaussian draws of the sampled coordinates, folded at the bounds of the parameters."""
+    whole, free, where = space(fit.model), fit.free, apparent(fit)
     low, high = whole.natural_lower[free], whole.natural_upper[free]
-    draws = rng.multivariate_normal(*_laplace_gaussian(fit), size=count, method="eigh")
+    draws = where.natural_array(rng.multivariate_normal(*_laplace_gaussian(fit), size=count, method="eigh"))
     turn = (draws[:, :-1] - low) % (2 * (high - low))
     folded = low + np.where(turn > high - low, 2 * (high - low) - turn, turn)
-    return np.column_stack([folded, np.abs(draws[:, -1])])
+    return where.sampled(np.column_stack([folded, np.abs(draws[:, -1])]))
 
 
 def _independent_proposal(fit: Fit) -> Callable[[np.ndarray, Any], tuple[np.ndarray, np.ndarray]]:
@@ -254,8 +257,9 @@ def _discrepancy_sd(fit: Fit) -> float:
     moves = np.sort(np.concatenate([unit * 2.0 ** np.arange(-12, 12), fit.discrepancy * 2.0 ** np.arange(-6, 2)]))
     moves = moves[moves > 0]
     natural = space(fit.model).natural_array(fit.values)[fit.free]
-    along = np.column_stack([np.tile(natural, (len(moves), 1)), fit.discrepancy + moves])
-    drop = fit.log_likelihood - log_posterior(fit, default_walkers(fit))(along)
+    along = apparent(fit).sampled(np.vstack([np.append(natural, fit.discrepancy + move) for move in (0.0, *moves)]))
+    density = log_posterior(fit, default_walkers(fit))(along)
+    drop = density[0] - density[1:]
     crossing = np.flatnonzero(drop > 2.0)
     if len(crossing) == 0:
         return float(moves[-1])
@@ -263,9 +267,9 @@ def _discrepancy_sd(fit: Fit) -> float:
     return float(moves[first] / np.sqrt(2.0 * drop[first]))
 
 
-def _physical(fit: Fit, natural: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _physical(fit: Fit, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sampled coordinates (m, free + 1) to full physical vectors (m, p) and discrepancies (m,)."""
-    whole = space(fit.model)
+    whole, natural = space(fit.model), apparent(fit).natural_array(coordinates)
     full = np.tile(fit.values, (len(natural), 1))
     log = whole.log[fit.free]
     full[:, fit.free] = np.where(log, np.exp(np.where(log, natural[:, :-1], 0.0)), natural[:, :-1])

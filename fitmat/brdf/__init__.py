@@ -8,3 +8,5 @@ from fitmat.brdf.registry import LOBES as LOBES
 from fitmat.brdf.registry import lobe_names as lobe_names
 from fitmat.brdf.registry import model as model
 from fitmat.brdf.registry import normalised as normalised
+from fitmat.brdf.seen import Seen as Seen
+from fitmat.brdf.seen import surface as surface

@@ -88,14 +88,20 @@ def read(
     """
     options = Options(quantity, angle_unit, forward, specular_azimuth, intensity, distance)
     recording = _recording(source, columns, options)
-    valid, masked = mask(recording)
-    if not valid.any():
-        listed = ", ".join(f"{count} {reason}" for reason, count in masked.items())
+    found = measured(recording, options)
+    if not found.valid.any():
+        listed = ", ".join(f"{count} {reason}" for reason, count in found.masked.items())
         expected = "expected at least one value that can be used. Check the columns and units"
         raise ReadError(f"{recording.source}: every row is masked ({listed}), {expected}.")
+    return dataclasses.replace(found, notes=(*found.notes, *_oddities(found)))
+
+
+def measured(recording: Recording, options: Options) -> Measurements:
+    """A recording in sr⁻¹ without cosine; what cannot be used is masked (value 0, sigma 1) and counted."""
+    valid, masked = mask(recording)
     wi, wo = (np.where(np.isnan(w), UP, w) for w in (recording.wi, recording.wo))
     scale = factor(recording.quantity, wi, wo, options.source)
-    measured = Measurements(
+    return Measurements(
         wi=wi,
         wo=wo,
         value=np.where(valid, recording.value * scale, 0.0),
@@ -104,9 +110,8 @@ def read(
         channels=recording.channels,
         source=recording.source,
         masked=masked,
+        notes=(note(recording.quantity, options.source), *recording.notes),
     )
-    notes = (note(recording.quantity, options.source), *recording.notes, *_oddities(measured))
-    return dataclasses.replace(measured, notes=notes)
 
 
 def _recording(source: Source, columns: str | Mapping[str, str | int] | None, options: Options) -> Recording:
