@@ -7,6 +7,8 @@ from .energy import hemispherical_albedo as hemispherical_albedo
 from .errors import FitmatError as FitmatError
 from .fitting import fit as fit
 from .formats import read as read
+from .formats import write as write
+from .instrument import Instrument as Instrument
 from .measurement import Measurements as Measurements
 from .measurement import from_arrays as from_arrays
 from .microsurface import Surface as Surface

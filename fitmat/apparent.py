@@ -1,7 +1,8 @@
 """Apparent weights: the coordinates in which a posterior with a shared scale is sampled.
 
 Where all values share an error g of the scale, the data determine g k_d and g k_s, and hardly g: in k_d and ln g the
-posterior is a thin, bent ridge. In the products it is straight. Nothing here knows the data.
+posterior is a thin, bent ridge, in the products it is straight. The priors of the weights are flat in the products,
+so that g keeps its own prior where the data say nothing of it. Nothing here knows the data.
 """
 
 import dataclasses
@@ -29,11 +30,9 @@ class Apparent:
     def _which(self) -> np.ndarray:
         return np.array(self.weights, int)
 
-    def natural(self, x: Float[Array, " d"]) -> tuple[Float[Array, " d"], Array]:
-        """Sampled → natural coordinates, and the log determinant of the change."""
-        if not self.weights:
-            return x, jnp.zeros(())
-        return x.at[self._which].multiply(jnp.exp(-x[self.scale])), -len(self.weights) * x[self.scale]
+    def natural(self, x: Float[Array, " d"]) -> Float[Array, " d"]:
+        """Sampled → natural coordinates."""
+        return x.at[self._which].multiply(jnp.exp(-x[self.scale])) if self.weights else x
 
     def natural_array(self, x: Float[np.ndarray, "m d"]) -> Float[np.ndarray, "m d"]:
         """`natural` for many draws in NumPy."""

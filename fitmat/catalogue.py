@@ -13,8 +13,9 @@ import numpy as np
 
 from fitmat.brdf import AbstractBRDF, model
 from fitmat.folder import write_text
+from fitmat.formats import csv
 from fitmat.measurement import Measurements
-from fitmat.synthetic import simulate, write_csv
+from fitmat.synthetic import simulate
 
 COMMAND = "fitmat simulate --catalogue data/synthetic"
 """What makes the files of the catalogue."""
@@ -111,7 +112,7 @@ def write_catalogue(folder: str | Path) -> tuple[Path, ...]:
     folder, paths = Path(folder), []
     for material in MATERIALS:
         made = (f"{material.name}: {material.words}", f"Made by {COMMAND}; the truth is in {material.name}.truth.json")
-        paths.append(write_csv(material.measured(), folder / f"{material.name}.csv", made))
+        paths.append(write_text(folder / f"{material.name}.csv", csv.dump(material.measured(), made)))
         record = json.dumps(material.record(), indent=2, ensure_ascii=False) + "\n"
         paths.append(write_text(folder / f"{material.name}.truth.json", record))
     return tuple(paths)

@@ -15,7 +15,7 @@ from typing import Any
 
 import typer
 
-from fitmat import options
+from fitmat import flags, options
 from fitmat.errors import FitmatError
 
 DEFAULT_MODELS = "lambert+blinn-phong,lambert+ggx"
@@ -50,18 +50,22 @@ def _setup() -> None:
 
 
 @app.command(
-    epilog="Columns, by name: theta_i, theta_o and phi (or phi_i and phi_o, or a signed theta_o alone) in degrees; "
-    "brdf, brdf_cos, reflectance_factor or radiance; brdf_r, brdf_g, brdf_b or brdf_550 for channels; sigma where the "
-    "noise is known.\n\n"
+    epilog="Columns of a table, by name: theta_i, theta_o and phi (or phi_i and phi_o, or a signed theta_o alone) in "
+    "degrees; brdf, brdf_cos, reflectance_factor, radiance, or signal and reference; brdf_r, brdf_g, brdf_b or "
+    "brdf_550 for channels; sigma where the noise is known.\n\n"
     "Written to --out: report.html (tables and pictures), fit.json (the same numbers), posterior-MODEL.nc (draws of "
     "the parameters, for ArviZ). Ctrl-C during sampling keeps what is done and still writes them.\n\n"
     "Examples:\n\n"
     "  fitmat fit measurements.csv\n\n"
     "  fitmat fit measurements.csv --models lambert+ggx --fix ks=1 --out run1\n\n"
     "  fitmat fit gold.csv --models ggx --ior Au --fix ks=1\n\n"
-    "  fitmat fit scan.txt --columns theta_i=AOI,brdf=4 --no-mcmc"
+    "  fitmat fit scan.txt --columns theta_i=AOI,brdf=4 --no-mcmc\n\n"
+    "  fitmat fit mirror.csv --receiver-angle 0.5 --calibration 0.03"
 )
+@flags.takes(flags.reading, flags.instrument)
 def fit(
+    reading: dict[str, Any],
+    instrument: Any,
     file: options.File,
     models: options.Models = DEFAULT_MODELS,
     out: options.Out = None,
@@ -71,13 +75,6 @@ def fit(
     seed: options.Seed = 0,
     fix: options.Fix = None,
     masking: options.Masking = None,
-    columns: options.Columns = None,
-    quantity: options.Quantity = None,
-    angle_unit: options.AngleUnit = None,
-    forward: options.Forward = "positive",
-    specular_azimuth: options.SpecularAzimuth = 180,
-    intensity: options.Intensity = None,
-    distance: options.Distance = None,
     ior: options.Ior = None,
     tilt: options.Tilt = False,
 ) -> None:
@@ -87,9 +84,8 @@ def fit(
     from fitmat.formats import read
     from fitmat.params import assignments
 
-    reading: dict[str, Any] = {"columns": columns, "quantity": quantity, "angle_unit": angle_unit, "forward": forward}
     names, fixed = console.model_names(models), assignments(fix or [], "--fix")
-    measurements = read(file, **reading, specular_azimuth=specular_azimuth, intensity=intensity, distance=distance)
+    measurements = read(file, **reading, instrument=instrument)
     known = conditions.prepared(names, measurements, ior=ior, tilt=tilt)
     target = out or folder.default(file)
     with folder.new(target, force=force, stale=report.POSTERIOR.format("*")) as draft:
@@ -111,7 +107,9 @@ def fit(
     "Example:\n\n"
     "  fitmat simulate lambert+ggx --set kd=0.3 --set alpha=0.2 --out plastic.csv"
 )
+@flags.takes(flags.instrument)
 def simulate(
+    instrument: Any,
     model: options.Model = None,
     out: options.SimulatedOut = Path("simulated.csv"),
     set_: options.Set = None,
@@ -140,7 +138,9 @@ def simulate(
             simulation.angles(phi_i, "--phi-i", lowest=0.0, highest=360.0),
         )
         truth = simulation.truth(model, set_ or [], masking)
-        written = simulation.write_simulation(out, truth, angles, noise=(noise, floor, seed), force=force)
+        written = simulation.write_simulation(
+            out, truth, angles, noise=(noise, floor, seed), instrument=instrument, force=force
+        )
     typer.echo("\n".join(str(path) for path in written))
 
 

@@ -84,9 +84,8 @@ def fit(
         )
     channels = len(measurements.channels)
     template = model(to, channels=channels, masking=masking) if isinstance(to, str) else to
-    instrument = measurements.instrument
-    shown = template if instrument.ideal else Seen(template, instrument)
-    held = _held(shown, {**_calibrated(shown, instrument), **(fixed or {})})
+    shown = _seen(template, measurements)
+    held = _held(shown, fixed or {})
     free = free_places(shown, held)
     needed = len(free) + 2
     if measurements.n_valid < needed:
@@ -95,22 +94,26 @@ def fit(
             f"parameters and needs at least {needed}; measure more angles or fix parameters (--fix ks=1)."
         )
     found_noise = measured_noise(measurements)
-    data = prepare(measurements, found_noise, _prior(shown, instrument))
+    data = prepare(measurements, found_noise, _prior(shown, measurements.instrument))
     first = first_discrepancy(data)
     starts = starting_points(template, data, first, held, STARTS)
-    if shown is not template:
-        added = np.array([1.0, _first_dark(measurements) if instrument.dark is None else instrument.dark])
-        starts = np.column_stack([starts, np.tile(added, (len(starts), 1))])
+    added = np.asarray(vector(shown))[len(vector(template)) :]
+    starts = np.column_stack([starts, np.tile(added, (len(starts), 1))])
     ends = jax.device_get(_refine(shown, data, jnp.asarray(starts), first, tuple(int(k) for k in free), max_steps))
     return conclude(measurements, shown, held, (found_noise, data), ends)
 
 
-def _calibrated(shown: AbstractBRDF, instrument: Instrument) -> dict[str, float]:
-    """What of an instrument is known exactly, by the name of its parameter in `Seen`."""
-    if not isinstance(shown, Seen):
-        return {}
-    scale = {} if instrument.calibration else {"scale": 1.0}
-    return scale if instrument.dark is None else scale | {"dark": instrument.dark}
+def _seen(template: AbstractBRDF, m: Measurements) -> AbstractBRDF:
+    """The model as the measurements' instrument shows it, with what is to be fitted of the instrument at its start."""
+    if m.instrument.ideal:
+        return template
+    dark = np.quantile((m.value * m.wo[:, 2:])[m.valid], 0.01)
+    return Seen(
+        template,
+        m.instrument,
+        scale=jnp.ones(()) if m.instrument.calibration else None,
+        dark=jnp.clip(0.5 * dark, 1e-6, 0.5) if m.instrument.dark is None else None,
+    )
 
 
 def _prior(shown: AbstractBRDF, instrument: Instrument) -> Prior | None:
@@ -121,12 +124,6 @@ def _prior(shown: AbstractBRDF, instrument: Instrument) -> Prior | None:
     precision = np.zeros(len(vector(shown)))
     precision[places["scale"]] = 1.0 / instrument.calibration
     return Prior(jnp.zeros(len(precision)), jnp.asarray(precision))
-
-
-def _first_dark(m: Measurements) -> float:
-    """Half of what the darkest hundredth of the values reaches, in units of f_r cosθ_o."""
-    dark = np.quantile((m.value * m.wo[:, 2:])[m.valid], 0.01)
-    return float(np.clip(0.5 * dark, 1e-6, 0.5))
 
 
 def _held(template: AbstractBRDF, fixed: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:

@@ -66,23 +66,30 @@ def _reason(error: OSError) -> str:
 
 
 def write_text(path: Path, text: str) -> Path:
+    """Write text in one stroke, as UTF-8 with newlines as they are; see `write_bytes`."""
+    return write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: Path, content: bytes) -> Path:
     """Write a file in one stroke: a reader sees the old content or the whole new one.
 
     Args:
-        path: The file; its folder is made where it does not exist.
-        text: Written as UTF-8 with newlines as they are.
+        path: The file, replaced where it exists; its folder is made where it does not.
+        content: What to write.
 
     Returns:
         The path.
 
     Raises:
-        OutputError: it cannot be written.
+        OutputError: it cannot be written; what was there before is still there.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        draft = path.with_name(f"{path.name}.part")
-        draft.write_text(text, encoding="utf-8", newline="\n")
-        draft.replace(path)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written ({error.strerror}); choose another place.") from error
+        with tempfile.TemporaryDirectory(prefix=".fitmat-", dir=path.parent, ignore_cleanup_errors=True) as folder:
+            draft = Path(folder) / "draft"
+            draft.write_bytes(content)
+            os.replace(draft, path)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise OutputError(f"{path}: cannot be written ({reason}); choose another place.") from error
     return path

@@ -20,6 +20,7 @@ UNKNOWN_RELATIVE = 1e-3
 COPIED = 1e-12
 """A scatter below this fraction of the maximum is that of copied rows, not of repeated measurements."""
 
+_DIGITS = 4
 _T_DOF = 4.0
 # Scale of a t distribution with 4 degrees of freedom that fits Gaussian data best: the root s of
 # E[5 x²/(4 s² + x²)] = 1 for x ~ N(0, 1).
@@ -77,14 +78,21 @@ def measured_noise(m: Measurements) -> Noise:
 
 
 def _curves(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Valid rows sorted by curve and angle: their indices, their curve's number, the angle along the curve."""
+    """Valid rows sorted by curve and angle: their indices, their curve's number, the angle along the curve.
+
+    A curve is taken along the sensor's angle, or, where the light's took more values, along that.
+    """
     rows = np.flatnonzero(m.valid[:, channel])
-    theta_o = np.where(m.in_plane, m.signed_theta_o, m.theta_o)[rows]
+    still, moving = m.theta_i, m.theta_o
+    if len(np.unique(np.round(still[rows], _DIGITS))) > len(np.unique(np.round(moving[rows], _DIGITS))):
+        still, moving = moving, still
+    side = np.where(m.in_plane & (m.phi < np.pi / 2), -1.0, 1.0)
     plane = np.where(m.in_plane, 0.0, np.round(np.rad2deg(m.phi), 2))[rows]
-    keys = np.stack([np.round(np.rad2deg(m.theta_i[rows]), 2), plane], axis=1)
+    keys = np.stack([np.round(np.rad2deg(still[rows]), 2), plane], axis=1)
     curve = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)
-    order = np.lexsort((theta_o, curve))
-    return rows[order], curve[order], theta_o[order]
+    angle = (side * moving)[rows]
+    order = np.lexsort((angle, curve))
+    return rows[order], curve[order], angle[order]
 
 
 def _leave_one_out(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -26,7 +26,6 @@ AGREE = 0.1
 UNDETERMINED = {"log": 1.0, "linear": 0.3}
 """A parameter whose standard deviation exceeds this (in ln p, or as a fraction of its range) is not determined."""
 
-
 FOLLOWS, MISSES = 0.5, 2.0
 """Ratios of discrepancy to noise up to which a model follows the data, and from which it is inadequate."""
 
@@ -188,7 +187,8 @@ def conclude(
     free = free_places(template, held)
     bounds = space(template).at_bound(np.asarray(ends.values[k]))
     information = _information(best, data, s, free)
-    covariance, undetermined = _uncertainty(best, information, free)
+    told = np.zeros(len(free), bool) if data.prior is None else np.asarray(data.prior.precision)[free] > 0
+    covariance, undetermined = _uncertainty(best, information, free, told)
     return Fit(
         name=template.name,
         model=best,
@@ -271,19 +271,21 @@ def inverse_information(information: np.ndarray, span: np.ndarray) -> np.ndarray
 
 
 def _uncertainty(
-    best: AbstractBRDF, information: np.ndarray, free: np.ndarray
+    best: AbstractBRDF, information: np.ndarray, free: np.ndarray, told: np.ndarray
 ) -> tuple[Float[np.ndarray, "p p"], tuple[str, ...]]:
     """The covariance in physical parameters, and what is not determined.
 
     What is determined is judged with every free parameter released, those on a bound as well: a fit that slid along a
     degenerate direction until it met a bound knows no more for that. Only where all are determined are the parameters
-    on a bound held there.
+    on a bound held there. Parameters of which a prior tells (`told`, as `free`) count as known in the judgement.
     """
     coordinates, values = space(best), np.asarray(vector(best))
     span = coordinates.natural_upper - coordinates.natural_lower
     released = inverse_information(information[np.ix_(free, free)], span[free])
-    limit = np.where(coordinates.log, UNDETERMINED["log"], UNDETERMINED["linear"] * span)[free]
-    loose = set(free[~(np.sqrt(np.diagonal(released)) <= limit)])
+    limit = np.where(coordinates.log, UNDETERMINED["log"], UNDETERMINED["linear"] * span)
+    judged = free[~told]
+    apart = released if not told.any() else inverse_information(information[np.ix_(judged, judged)], span[judged])
+    loose = set(judged[~(np.sqrt(np.diagonal(apart)) <= limit[judged])])
     on_bound = (coordinates.at_bound(values) != 0) & np.isin(np.arange(len(values)), free)
     inside = free[~on_bound[free]]
     if loose:

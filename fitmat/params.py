@@ -63,11 +63,16 @@ def param(
     weight: bool = False,
     starts: tuple[float, ...] = (),
     default: float | None = None,
+    optional: bool = False,
 ) -> Any:
-    """Declare a model field as a parameter; see `Param` for the arguments."""
+    """Declare a model field as a parameter; see `Param` for the arguments; an optional one may be None."""
     meta = Param(lower, upper, symbol, unit, scale, per_channel, weight, starts, doc)
-    extra: dict[str, Any] = {} if default is None else {"default": default}
-    return eqx.field(converter=as_parameter, metadata={"param": meta}, **extra)
+    extra: dict[str, Any] = {} if default is None and not optional else {"default": default}
+    return eqx.field(converter=_as_optional if optional else as_parameter, metadata={"param": meta}, **extra)
+
+
+def _as_optional(value: Any) -> Array | None:
+    return None if value is None else as_parameter(value)
 
 
 def as_parameter(value: Any) -> Array:
@@ -96,6 +101,8 @@ def _walk(module: Any, owner: str) -> list[tuple[str, str, Param, tuple[int, ...
     found = []
     for field in dataclasses.fields(module):
         value = getattr(module, field.name)
+        if "param" in field.metadata and value is None:
+            continue
         if "param" in field.metadata:
             found.append((owner, field.name, field.metadata["param"], np.shape(value)))
         elif isinstance(value, tuple):

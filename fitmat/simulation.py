@@ -11,6 +11,9 @@ import numpy as np
 from fitmat import catalogue, synthetic
 from fitmat.brdf import AbstractBRDF, model
 from fitmat.errors import ModelError, OutputError
+from fitmat.folder import write_text
+from fitmat.formats import csv
+from fitmat.instrument import Instrument
 from fitmat.params import assignments
 
 MOST_ANGLES = 10_000
@@ -66,6 +69,7 @@ def write_simulation(
     geometry: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     *,
     noise: tuple[float, float, int],
+    instrument: Instrument,
     force: bool,
 ) -> tuple[Path, ...]:
     """Simulate and write one CSV file.
@@ -75,6 +79,7 @@ def write_simulation(
         material: The true model.
         geometry: theta_i, signed theta_o, phi and phi_i in degrees; every combination is measured.
         noise: Relative noise, absolute noise in sr⁻¹, seed.
+        instrument: What measures it.
         force: Replace an existing file.
 
     Raises:
@@ -92,9 +97,11 @@ def write_simulation(
         relative_noise=relative,
         absolute_noise=absolute,
         seed=seed,
+        instrument=instrument,
     )
     described = f"simulated {material.name}; noise {relative:g} relative + {absolute:g} sr^-1, seed {seed}"
-    return (synthetic.write_csv(measured, path, [described]),)
+    comments = [described, *filter(None, [str(instrument)])]
+    return (write_text(path, csv.dump(measured, comments)),)
 
 
 def write_catalogue(folder: Path, *, force: bool) -> tuple[Path, ...]:

@@ -1,25 +1,20 @@
 """Synthetic measurements: a model of known parameters seen by an instrument of known noise.
 
-It fits nothing and reads no file; what it writes, `fitmat.formats.read` reads.
+It fits nothing, reads no file and writes none.
 """
 
 import dataclasses
-from collections.abc import Iterable
-from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fitmat.brdf import AbstractBRDF, Seen, evaluate
 from fitmat.errors import FitmatError, ModelError
-from fitmat.folder import write_text
 from fitmat.geometry import from_angles
 from fitmat.instrument import IDEAL, Instrument
 from fitmat.measurement import Measurements, from_arrays
 from fitmat.params import vector
-
-FLAT = 1e-6
-"""Radians; an azimuth this close to 0 or π is written as the sign of theta_o."""
 
 
 def simulate(
@@ -53,7 +48,7 @@ def simulate(
         channels: Names of the c channels.
         give_sigma: Whether the measurements know their σ; never where there is no noise.
         instrument: What shows the surface. Its calibration error is drawn once, from
-            ln g ~ N(0, calibration²); a dark signal that is to be fitted must be given a value.
+            ln g ~ N(0, calibration²); its dark signal must have a value.
 
     Returns:
         n = d·a·c·b samples, theta_o running fastest; a sample of σ = 0 among others is masked.
@@ -79,8 +74,8 @@ def simulate(
         _refuse_outside(name, noise, np.inf, "a finite number of at least 0")
     wi, wo = from_angles(light, turn), from_angles(np.abs(sensor), turn + relative + np.where(sensor < 0, np.pi, 0.0))
     rng = np.random.default_rng(seed)
-    scale = np.exp(instrument.calibration * rng.normal()) if instrument.calibration else 1.0
-    shown = truth if instrument.ideal else Seen(truth, instrument, scale=scale, dark=instrument.dark)
+    scale = jnp.exp(instrument.calibration * rng.normal()) if instrument.calibration else None
+    shown = truth if instrument.ideal else Seen(truth, instrument, scale=scale)
     exact = evaluate(shown, wi, wo)
     if channels is not None and len(channels) != exact.shape[1]:
         raise ModelError(f"{len(channels)} channel names, expected {exact.shape[1]}, one for each of the model's.")
@@ -88,8 +83,9 @@ def simulate(
     value = exact + sigma * rng.normal(size=exact.shape)
     given = sigma if give_sigma and relative_noise + absolute_noise > 0 else None
     source = f"simulated {truth.name}"
-    azimuths = {"phi": relative, "phi_i": turn}
-    measured = from_arrays(light, sensor, value, **azimuths, sigma=given, channels=channels, source=source)
+    measured = from_arrays(
+        light, sensor, value, phi=relative, phi_i=turn, sigma=given, channels=channels, source=source
+    )
     return dataclasses.replace(measured, instrument=instrument)
 
 
@@ -104,43 +100,3 @@ def _refuse_outside(name: str, values: ArrayLike, upper: float, expected: str) -
     values = np.ravel(np.asarray(values, float))
     for value in values[~(np.isfinite(values) & (values >= 0) & (values <= upper))][:1]:
         raise ModelError(f"{name} = {value:g}: expected {expected}.")
-
-
-def write_csv(measurements: Measurements, path: str | Path, comments: Iterable[str] = ()) -> Path:
-    """Write measurements as a table that `fitmat.formats.read` reads: angles in degrees, BRDF and σ in sr⁻¹.
-
-    Columns theta_i, theta_o, brdf (brdf_r, … for several channels) and, where known, sigma; in the plane of incidence
-    theta_o is signed, positive on the mirror side, else a column phi follows it, or phi_i and phi_o where the light
-    does not always come from azimuth 0. Masked values are written as nan.
-    Values have 7 digits, angles 10⁻⁶ degrees, so that the same measurements give the same bytes.
-
-    Args:
-        measurements: What to write.
-        path: The file, replaced where it exists.
-        comments: Lines to go before the header, each behind a #.
-
-    Returns:
-        The path.
-
-    Raises:
-        OutputError: the file cannot be written.
-    """
-    m = measurements
-    aside = np.minimum(m.phi, np.pi - m.phi)
-    flat = bool(np.all((aside < FLAT) | (m.theta_i < FLAT) | (m.theta_o < FLAT)))
-    turned = bool(np.any(np.abs((m.phi_i + np.pi) % (2 * np.pi) - np.pi) > FLAT))
-    angles = {"theta_i": m.theta_i, "theta_o": m.signed_theta_o if flat and not turned else m.theta_o}
-    if turned:
-        angles |= {"phi_i": m.phi_i, "phi_o": np.arctan2(m.wo[:, 1], m.wo[:, 0]) % (2 * np.pi)}
-    elif not flat:
-        angles |= {"phi": m.phi}
-    tails = [f"_{name}" for name in m.channels] if len(m.channels) > 1 else [""]
-    numbers = [np.where(m.valid, part, np.nan) for part in (m.value, m.sigma) if part is not None]
-    kinds = ("brdf", "sigma")[: len(numbers)]
-    header = [*angles, *(kind + tail for kind in kinds for tail in tails)]
-    degrees = np.round(np.rad2deg(np.stack(list(angles.values()), axis=1)), 6) + 0.0
-    rows = [
-        ",".join([*(f"{angle:.9g}" for angle in left), *(f"{number:.6e}" for number in right)])
-        for left, right in zip(degrees, np.concatenate(numbers, axis=1), strict=True)
-    ]
-    return write_text(Path(path), "\n".join([*(f"# {line}" for line in comments), ",".join(header), *rows, ""]))

@@ -1,7 +1,8 @@
 """How sure the data are: draws from the posterior, by Laplace's approximation or by emcee, and whether to trust them.
 
 Priors are flat within the bounds: in the logarithm for parameters whose scale is log (alpha, exponent, eta, kappa,
-f0), linearly for kd, ks and the discrepancy s ≥ 0. This is the only room that imports emcee.
+f0), linearly for kd, ks and the discrepancy s ≥ 0; a shared scale g has ln g ~ N(0, calibration²). This is the only
+room that imports emcee.
 """
 
 import dataclasses
@@ -194,12 +195,12 @@ def _log_posterior(arrays: Any, static: Any, free: tuple[int, ...], where: Appar
 
 def _log_density(template: AbstractBRDF, data: Data, free: tuple[int, ...], where: Apparent, x: Array) -> Array:
     whole, places = space(template), np.array(free, int)
-    natural, change = where.natural(x)
+    natural = where.natural(x)
     t, s = natural[:-1], natural[-1]
     inside = jnp.all((t >= whole.natural_lower[places]) & (t <= whole.natural_upper[places])) & (s >= 0.0)
     full = whole.natural(vector(template)).at[places].set(jnp.where(inside, t, whole.natural_lower[places]))
     value = log_density(with_vector(template, whole.physical(full)), data, jnp.abs(s))
-    return jnp.where(inside & jnp.isfinite(value), value + change, -jnp.inf)
+    return jnp.where(inside & jnp.isfinite(value), value, -jnp.inf)
 
 
 def _laplace_gaussian(fit: Fit) -> tuple[np.ndarray, np.ndarray]:

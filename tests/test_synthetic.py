@@ -14,10 +14,11 @@ from fitmat.brdf import AbstractBRDF, evaluate, model
 from fitmat.catalogue import MATERIALS, Material, write_catalogue
 from fitmat.errors import FitmatError, ModelError, OutputError
 from fitmat.fitting import fit
-from fitmat.formats import read
+from fitmat.folder import write_text
+from fitmat.formats import csv, read
 from fitmat.measurement import from_arrays
 from fitmat.outcome import Fit
-from fitmat.synthetic import simulate, write_csv
+from fitmat.synthetic import simulate
 
 FOLDER = pathlib.Path(__file__).parents[1] / "data" / "synthetic"
 NAMES = {material.name: material for material in MATERIALS}
@@ -181,7 +182,7 @@ def test_single_precision_is_refused() -> None:
 def test_out_of_plane_files_have_an_azimuth(tmp_path: pathlib.Path) -> None:
     theta = ([0.2, 0.7], [-0.5, 0.3, 0.7])
     m = simulate(gloss(), *theta, relative_noise=0.1, absolute_noise=0.01, seed=1, phi=2.0)
-    path = write_csv(m, tmp_path / "aside.csv", ["one", "two"])
+    path = write_text(tmp_path / "aside.csv", csv.dump(m, ["one", "two"]))
     lines = path.read_text(encoding="utf-8").splitlines()
     assert lines[:3] == ["# one", "# two", "theta_i,theta_o,phi,brdf,sigma"]
     assert read(path).phi == pytest.approx(m.phi, abs=1e-7)
@@ -190,7 +191,7 @@ def test_out_of_plane_files_have_an_azimuth(tmp_path: pathlib.Path) -> None:
 
 def test_masked_values_stay_masked(tmp_path: pathlib.Path) -> None:
     m = from_arrays(np.array([0.5, 0.5]), np.array([0.1, 0.2]), np.array([[0.1, np.nan, 0.3], [0.1, 0.2, 0.3]]))
-    again = read(write_csv(m, tmp_path / "masked.csv"))
+    again = read(write_text(tmp_path / "masked.csv", csv.dump(m)))
     assert again.valid.tolist() == m.valid.tolist()
     assert again.channels == m.channels
 

@@ -34,7 +34,8 @@ class Seen(AbstractBRDF):
     rule of 55 nodes (`cone_rule`): a fit costs about 55 times as much as one with an ideal instrument. With apertures
     of half-angle A and B a lobe of slope α is exact to 0.2 % while A + B ≤ 2 α, to 2 % while A + B ≤ 3 α.
 
-    Parameters: scale g, known to the calibration's standard deviation; dark signal b in sr⁻¹.
+    Parameters: scale g, known to the calibration's standard deviation, where that is not 0; dark signal b in sr⁻¹ where
+    it is not known. Both None where there is nothing to fit.
 
     Limits: for an ideal instrument the base itself; of a Lambertian base g k_d/π whatever the apertures.
 
@@ -43,12 +44,12 @@ class Seen(AbstractBRDF):
 
     base: AbstractBRDF
     instrument: Instrument = eqx.field(static=True)
-    scale: Scalar = param(
-        1e-4, 1e4, symbol="g", scale="log", default=1.0, starts=(1.0,),
+    scale: Scalar | None = param(
+        1e-4, 1e4, symbol="g", scale="log", optional=True, starts=(1.0,),
         doc="error of the scale that all values share; 1 where the calibration is right",
     )  # fmt: skip
-    dark: Scalar = param(
-        0.0, 1.0, symbol="b", unit="1/sr", default=0.0, starts=(0.0,),
+    dark: Scalar | None = param(
+        0.0, 1.0, symbol="b", unit="1/sr", optional=True, starts=(0.0,),
         doc="dark signal and stray light, as f_r cosθ_o",
     )  # fmt: skip
 
@@ -61,14 +62,18 @@ class Seen(AbstractBRDF):
         """The module's formula."""
         cones = self.instrument.source + self.instrument.receiver > 0
         shown = self._averaged(wi, wo) if cones else self.base(wi, wo)
-        shown += self.dark / jnp.maximum(wo[2], COS_MIN)
-        return self.scale * jnp.where(above(wi, wo), shown, 0.0)
+        shown += self._dark / jnp.maximum(wo[2], COS_MIN)
+        return (1.0 if self.scale is None else self.scale) * jnp.where(above(wi, wo), shown, 0.0)
+
+    @property
+    def _dark(self) -> Scalar:
+        return jnp.asarray(self.instrument.dark if self.dark is None else self.dark)
 
     def _averaged(self, wi: Vec3, wo: Vec3) -> Spectrum:
-        lights, sensors, weights = cone_rule(self.instrument.source, self.instrument.receiver)
-        wi, wo = lights @ _frame(wi), sensors @ _frame(wo)
-        product = weights * wi[:, 2] * wo[:, 2]
-        return product @ jax.vmap(self.base)(wi, wo) / jnp.maximum(jnp.sum(product), COS_MIN)
+        rule = cone_rule(self.instrument.source, self.instrument.receiver)
+        lights, sensors = jnp.asarray(rule[0]) @ _frame(wi), jnp.asarray(rule[1]) @ _frame(wo)
+        product = jnp.asarray(rule[2]) * lights[:, 2] * sensors[:, 2]
+        return product @ jax.vmap(self.base)(lights, sensors) / jnp.maximum(jnp.sum(product), COS_MIN)
 
     def width(self) -> Scalar:
         """That of the base."""

@@ -6,3 +6,4 @@ What a reader cannot know it asks for; it guesses no unit, no quantity and no co
 from fitmat.formats.options import ALLOWED as ALLOWED
 from fitmat.formats.reader import Source as Source
 from fitmat.formats.reader import read as read
+from fitmat.formats.writing import write as write

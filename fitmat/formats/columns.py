@@ -22,8 +22,12 @@ ALIASES = {
     "brdf_cos": ("ccbrdf", "ccbsdf"),
     "reflectance_factor": ("brf",),
     "radiance": (),
+    "panel_ratio": ("ratio",),
+    "signal": ("reading", "counts"),
+    "reference": ("reference_signal", "white", "panel"),
     "value": (),
     "sigma": ("std", "brdf_sigma", "brdf_std"),
+    "sigma_reference": (),
     "wavelength": ("wavelength_nm", "lambda", "lambda_nm"),
     "channel": ("band",),
     "valid": (),
@@ -31,9 +35,10 @@ ALIASES = {
 }
 """Our name → its aliases; letter case, spaces, hyphens, Greek letters, [deg], [1/sr], [nm] do not matter."""
 
-VALUES = (*QUANTITIES, "value")
+VALUES = (*QUANTITIES, "signal", "value")
 EXAMPLE = 'columns="theta_i=Zenith,theta_o=3" (--columns)'
 
+_BESIDE = ("sigma", "reference", "sigma_reference")
 _KINDS = {alias: kind for kind, others in ALIASES.items() for alias in (kind, *others)}
 _GREEK = str.maketrans({"θ": "theta", "ϑ": "theta", "φ": "phi", "ϕ": "phi", "λ": "lambda", "σ": "sigma"})
 _UNIT = re.compile(r"\s*[\[(](deg|degrees?|°|1/sr|sr-1|sr\^-1|sr\^\{-1\}|sr⁻¹|nm)[\])]\s*$")
@@ -59,14 +64,18 @@ class Columns:
         angles: theta_i, theta_o and, where given, phi or phi_i and phi_o.
         values: Channel → column of the quantity.
         sigmas: Channel → column of its σ; empty where there is none.
+        references: Channel → column of the reading of a white panel in the same geometry; empty where there is none.
+        reference_sigmas: Channel → column of that reading's σ.
         marks: valid, invalid, wavelength, channel, where given.
-        quantity: One of `QUANTITIES`.
+        quantity: One of `QUANTITIES`, or "signal", which becomes "panel_ratio" by its reference.
         unused: Names of the columns that play no part.
     """
 
     angles: dict[str, int]
     values: dict[str, int]
     sigmas: dict[str, int]
+    references: dict[str, int]
+    reference_sigmas: dict[str, int]
     marks: dict[str, int]
     quantity: str
     unused: tuple[str, ...]
@@ -90,10 +99,11 @@ def assign(table: Table, columns: str | Mapping[str, str | int] | None, quantity
     if len(marks.keys() & {"wavelength", "channel"}) + any(values) > 1:
         expected = "expected one channel per column, or one wavelength or channel column"
         raise ReadError(f"{table.source}: channels named in two ways, {expected}. Remove one of them.")
-    sigmas = _sigmas(table, {r.channel: c for r, c in roles.items() if r.kind == "sigma"}, values)
-    used = {*angles.values(), *values.values(), *sigmas.values(), *marks.values()}
+    sigmas, references, spreads = (_beside(table, kind, roles, values) for kind in _BESIDE)
+    _refuse_unreferenced(table, quantity, references)
+    used = {c for group in (angles, values, sigmas, references, spreads, marks) for c in group.values()}
     unused = tuple(table.label(c) for c in range(len(table.names)) if c not in used)
-    return Columns(angles, values, sigmas, marks, quantity, unused)
+    return Columns(angles, values, sigmas, references, spreads, marks, quantity, unused)
 
 
 def role(name: str, *, any_channel: bool = False) -> Role | None:
@@ -109,7 +119,7 @@ def role(name: str, *, any_channel: bool = False) -> Role | None:
         return Role(_KINDS[plain])
     stem, _, channel = plain.rpartition("_")
     kind = _KINDS.get(stem)
-    if kind not in (*VALUES, "sigma"):
+    if kind not in (*VALUES, *_BESIDE):
         return None
     number = re.fullmatch(r"(\d+(?:\.\d+)?)(nm)?", channel)
     known = number[1] if number else _CHANNELS.get(channel, channel if any_channel else "")
@@ -215,16 +225,30 @@ def _quantity(table: Table, roles: Iterable[Role], quantity: str | None) -> tupl
     return kinds[0], kinds[0]
 
 
-def _sigmas(table: Table, sigmas: Mapping[str, int], values: Iterable[str]) -> dict[str, int]:
-    """One σ column per channel; a plain sigma serves every channel."""
-    if not sigmas:
+def _beside(table: Table, kind: str, roles: Mapping[Role, int], values: Iterable[str]) -> dict[str, int]:
+    """One column of that kind per channel; a plain one serves every channel."""
+    given = {mine.channel: column for mine, column in roles.items() if mine.kind == kind}
+    if not given:
         return {}
-    found = {channel: sigmas.get(channel, sigmas.get("", -1)) for channel in values}
-    if -1 in found.values() or sigmas.keys() - found.keys() - {""}:
-        given, wanted = (", ".join(str(Role("sigma", name)) for name in names) for names in (sigmas, found))
-        remedy = "Name them alike, or give one plain sigma."
-        raise ReadError(f"{table.source}: {given} given, expected {wanted}. {remedy}")
+    found = {channel: given.get(channel, given.get("", -1)) for channel in values}
+    if -1 in found.values() or given.keys() - found.keys() - {""}:
+        named, wanted = (", ".join(str(Role(kind, name)) for name in names) for names in (given, found))
+        remedy = f"Name them alike, or give one plain {kind}."
+        raise ReadError(f"{table.source}: {named} given, expected {wanted}. {remedy}")
     return found
+
+
+def _refuse_unreferenced(table: Table, quantity: str, references: Mapping[str, int]) -> None:
+    if quantity == "signal" and not references:
+        expected = "expected a column reference beside it: the reading of a white panel in the same geometry"
+        remedy = (
+            "Without one, say what the signal is proportional to, for example "
+            '--columns "brdf_cos=signal" --unknown-scale.'
+        )
+        raise ReadError(f"{table.source}: signal alone, {expected}. {remedy}")
+    if references and quantity != "signal":
+        expected = "expected it beside signal only"
+        raise ReadError(f"{table.source}: a column reference beside {quantity}, {expected}. Rename or remove it.")
 
 
 def _found(table: Table) -> str:

@@ -9,7 +9,7 @@ from fitmat.errors import ReadError
 from fitmat.lighting import PointSource
 
 ALLOWED: dict[str, tuple[str | int | None, ...]] = {
-    "quantity": (None, "brdf", "brdf_cos", "reflectance_factor", "radiance"),
+    "quantity": (None, "brdf", "brdf_cos", "reflectance_factor", "radiance", "panel_ratio", "signal"),
     "angle_unit": (None, "degrees", "radians"),
     "forward": ("positive", "negative"),
     "specular_azimuth": (180, 0),
@@ -28,6 +28,9 @@ class Options:
         specular_azimuth: Relative azimuth of the mirror side in the file, 180 or 0 degrees.
         intensity: Of the point source that caused radiances, W/sr.
         distance: Of that source, m.
+        where: NAME=VALUE of the rows of a table to read; None for all.
+        panel: Reflectance factor of the white panel to which readings were compared, 0 to 2.
+        unknown_scale: Whether the values are known but for a factor that all of them share.
     """
 
     quantity: str | None = None
@@ -36,6 +39,9 @@ class Options:
     specular_azimuth: int = 180
     intensity: float | None = None
     distance: float | None = None
+    where: str | None = None
+    panel: float | None = None
+    unknown_scale: bool = False
 
     def __post_init__(self) -> None:
         for name, choices in ALLOWED.items():
@@ -47,6 +53,10 @@ class Options:
         if (self.intensity is None) != (self.distance is None):
             got = "intensity" if self.distance is None else "distance"
             raise ReadError(f"{got} alone, expected intensity and distance (--intensity, --distance). Give both.")
+
+        if self.panel is not None and not 0 < self.panel <= 2:
+            expected = "expected its reflectance factor, 0 to 2 (Spectralon: 0.99)"
+            raise ReadError(f"panel = {self.panel:g} (--panel), {expected}. Correct it.")
 
     @property
     def source(self) -> PointSource | None:

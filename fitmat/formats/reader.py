@@ -12,14 +12,31 @@ import numpy as np
 import polars as pl
 
 from fitmat.errors import ReadError
-from fitmat.formats import files, tabular, text
+from fitmat.formats import (
+    alta,
+    astm,
+    files,
+    frames,
+    fred,
+    lighttools,
+    merl,
+    parquet,
+    rgl,
+    ssdd,
+    tabular,
+    text,
+    utia,
+    zemax,
+)
 from fitmat.formats.options import Options
 from fitmat.formats.quantity import factor, note
 from fitmat.formats.recording import Recording, mask
+from fitmat.formats.scale import of_unknown_scale
 from fitmat.formats.table import Table, from_arrays
+from fitmat.instrument import IDEAL, Instrument
 from fitmat.measurement import Measurements
 
-FORMATS: tuple[Any, ...] = ()
+FORMATS: tuple[Any, ...] = (rgl, merl, zemax, lighttools, fred, astm, alta, ssdd, utia)
 """Rooms of one format each, asked in this order: `claims(head, size)` says whether a file is theirs, `load(path)` makes
 the `Recording`; what none claims is a text table."""
 
@@ -55,6 +72,10 @@ def read(
     specular_azimuth: int = 180,
     intensity: float | None = None,
     distance: float | None = None,
+    where: str | None = None,
+    panel: float | None = None,
+    unknown_scale: bool = False,
+    instrument: Instrument = IDEAL,
 ) -> Measurements:
     """Read BRDF measurements from a text table, a data frame or a dict of arrays.
 
@@ -62,19 +83,26 @@ def read(
 
     - theta_i, theta_o, and phi = φ_o − φ_i or phi_i and phi_o, in degrees; the mirror side is φ = 180.
       Without azimuth, theta_o is signed: positive is forward, the mirror side.
-    - The quantity: brdf, brdf_cos (= f_r cos θ_o), reflectance_factor (= π f_r) or radiance. One column; one for each
-      channel, as brdf_r or brdf_550; or one row for each channel, beside a column wavelength (nm) or channel.
-    - Where known: sigma, or sigma_r …, in the unit of the quantity; valid, or flag.
+    - The quantity: brdf, brdf_cos (= f_r cos θ_o), reflectance_factor (= π f_r), radiance, panel_ratio, or signal and
+      reference (readings of the sample and of a white panel). One column; one for each channel, as brdf_r or brdf_550;
+      or one row for each channel, beside a column wavelength (nm) or channel.
+    - Where known: sigma, or sigma_r …, in the unit of the quantity (and sigma_reference); valid, or flag.
 
     Args:
         source: Path of a file, pandas or polars data frame, or name → array of n numbers.
         columns: Our name → name or number (from 1) in the file; or as text, "theta_i=Zenith,theta_o=3".
-        quantity: What a column called value holds: "brdf", "brdf_cos", "reflectance_factor" or "radiance".
+        quantity: What a column called value holds: "brdf", "brdf_cos", "reflectance_factor", "radiance" or
+            "panel_ratio".
         angle_unit: "degrees" or "radians"; None for degrees, refused where the range looks like radians.
         forward: Sign of theta_o on the mirror side where there is no azimuth: "positive" or "negative".
         specular_azimuth: Relative azimuth of the mirror side in the file, 180 or 0.
         intensity: Of the point source that lit the sample, W/sr, where radiances in W/(m² sr) were read.
         distance: Of that source from the sample, m.
+        where: Read only rows in which a column has this value, "material=Alu".
+        panel: Reflectance factor of the white panel to which readings were compared.
+        unknown_scale: Whether the values are known but for a common factor. They are divided by one that gives a
+            typical curve an albedo of about 0.4 (`fitmat.formats.scale`), and the scale is fitted.
+        instrument: Apertures, calibration and dark signal of what took them.
 
     Returns:
         All rows, in sr⁻¹ without cosine; what cannot be used is masked (value 0, sigma 1) and counted.
@@ -86,21 +114,24 @@ def read(
         >>> read({"theta_i": [30, 30], "theta_o": [-30, 30], "brf": [1.0, 2.0]}).value.round(2).T
         array([[0.32, 0.64]])
     """
-    options = Options(quantity, angle_unit, forward, specular_azimuth, intensity, distance)
+    options = Options(quantity, angle_unit, forward, specular_azimuth, intensity, distance, where, panel, unknown_scale)
     recording = _recording(source, columns, options)
     found = measured(recording, options)
     if not found.valid.any():
         listed = ", ".join(f"{count} {reason}" for reason, count in found.masked.items())
         expected = "expected at least one value that can be used. Check the columns and units"
         raise ReadError(f"{recording.source}: every row is masked ({listed}), {expected}.")
-    return dataclasses.replace(found, notes=(*found.notes, *_oddities(found)))
+    found = dataclasses.replace(
+        found, notes=(*found.notes, *_oddities(found, recording.distinct)), instrument=instrument
+    )
+    return of_unknown_scale(found) if unknown_scale else found
 
 
 def measured(recording: Recording, options: Options) -> Measurements:
     """A recording in sr⁻¹ without cosine; what cannot be used is masked (value 0, sigma 1) and counted."""
     valid, masked = mask(recording)
     wi, wo = (np.where(np.isnan(w), UP, w) for w in (recording.wi, recording.wo))
-    scale = factor(recording.quantity, wi, wo, options.source)
+    scale = factor(recording.quantity, wi, wo, options)
     return Measurements(
         wi=wi,
         wo=wo,
@@ -110,7 +141,7 @@ def measured(recording: Recording, options: Options) -> Measurements:
         channels=recording.channels,
         source=recording.source,
         masked=masked,
-        notes=(note(recording.quantity, options.source), *recording.notes),
+        notes=(note(recording.quantity, options), *recording.notes),
     )
 
 
@@ -118,14 +149,27 @@ def _recording(source: Source, columns: str | Mapping[str, str | int] | None, op
     if not isinstance(source, str | os.PathLike):
         return tabular.recording(_table(source), columns, options)
     head, size = files.contents(source, files.HEAD), files.size(source)
-    for layout in FORMATS:
-        if layout.claims(head, size):
-            return layout.load(source)
-    return tabular.recording(text.load(source), columns, options)
+    layout = next((layout for layout in FORMATS if layout.claims(head, size)), None)
+    if layout is None:
+        table = parquet.load(source) if parquet.claims(head, size) else text.load(source)
+        return tabular.recording(table, columns, options)
+    _refuse_needless(files.name(source), layout.__name__.rpartition(".")[2], columns, options)
+    return layout.load(source)
+
+
+def _refuse_needless(name: str, layout: str, columns: str | Mapping[str, str | int] | None, options: Options) -> None:
+    """Stop where the user says of a file what its format settles."""
+    usual = Options()
+    said = [n for n in ("quantity", "where", "angle_unit", "forward") if getattr(options, n) != getattr(usual, n)]
+    for option in [*(["columns"] if columns else []), *said][:1]:
+        expected = f"expected no {option}= (--{option.replace('_', '-')}): the format settles it"
+        raise ReadError(f"{name}: a file of the format {layout}, {expected}. Leave it out.")
 
 
 def _table(source: Mapping[str, Any] | Frame) -> Table:
     kind = type(source).__name__
+    if isinstance(source, frames.Labelled):
+        return from_arrays(frames.arrays(source), kind)
     if isinstance(source, Mapping):
         return from_arrays(source, kind)
     if not isinstance(source, Frame):
@@ -137,12 +181,16 @@ def _table(source: Mapping[str, Any] | Frame) -> Table:
     return from_arrays(arrays, kind)
 
 
-def _oddities(measured: Measurements) -> Iterator[str]:
+def _oddities(measured: Measurements, distinct: bool) -> Iterator[str]:
     """What a user should know of the rows that are kept."""
-    used = measured.rows(np.flatnonzero(measured.valid.any(axis=1)))
-    theta_i, theta_o, phi = (np.round(angle, _DIGITS) for angle in (used.theta_i, used.theta_o, used.phi))
-    phi = np.where((theta_i == 0) | (theta_o == 0), 0.0, phi)
-    if repeats := used.n_samples - pl.DataFrame([theta_i, theta_o, phi]).n_unique():
+    if not distinct and (repeats := _repeats(measured)):
         yield f"Rows that repeat an earlier geometry, all kept: {repeats}."
     if negatives := np.count_nonzero(measured.value < 0):
         yield f"Negative values kept as noise: {negatives}."
+
+
+def _repeats(measured: Measurements) -> int:
+    used = measured.rows(np.flatnonzero(measured.valid.any(axis=1)))
+    theta_i, theta_o, phi = (np.round(angle, _DIGITS) for angle in (used.theta_i, used.theta_o, used.phi))
+    phi = np.where((theta_i == 0) | (theta_o == 0), 0.0, phi)
+    return used.n_samples - pl.DataFrame([theta_i, theta_o, phi]).n_unique()

@@ -29,6 +29,7 @@ class Recording:
         sigma: Standard deviation in the unit of `value`, (n, c); None where unknown.
         doubts: Reason → which values the file itself marks as no datum, (n, c).
         notes: Plain sentences: conventions of the format, what was assumed.
+        distinct: Whether no geometry can occur twice, because the format is a grid.
     """
 
     source: str
@@ -40,6 +41,7 @@ class Recording:
     sigma: Float[np.ndarray, "n c"] | None = None
     doubts: dict[str, Bool[np.ndarray, "n c"]] = dataclasses.field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    distinct: bool = False
 
 
 def pivot(long: Recording, labels: np.ndarray) -> Recording:

@@ -18,6 +18,7 @@ MISSING = ("", "nan", "na", "n/a", "<na>", "null", "none", "-")
 _TRUTH = {"true": "1", "t": "1", "yes": "1", "y": "1", "false": "0", "f": "0", "no": "0", "n": "0"}
 _PLAIN = {"−": "-", ",": "."}
 _LONGEST = 40
+_LISTED = 20
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -66,6 +67,27 @@ class Table:
         """The column as text, (n,), "" where a cell is empty."""
         text = self.cells.to_series(column).cast(pl.String).fill_null("").str.strip_chars()
         return text.to_numpy().astype(str)
+
+    def chosen(self, where: str) -> "Table":
+        """The rows in which a column has a value, `where` being NAME=VALUE.
+
+        Raises:
+            ReadError: no such column, or no such row; what there is is listed.
+        """
+        name, _, value = (part.strip() for part in where.partition("="))
+        if name not in self.names:
+            listed = ", ".join(filter(None, self.names)) or "none has a name"
+            raise ReadError(f"{self.source}: where = {where!r} (--where), expected a column of {listed}. Correct it.")
+        words = self.words(self.names.index(name))
+        rows = np.flatnonzero(words == value)
+        if not len(rows):
+            found = list(dict.fromkeys(words.tolist()))
+            listed = ", ".join(found[:_LISTED]) + (" …" if len(found) > _LISTED else "")
+            raise ReadError(
+                f"{self.source}: {name} is never {value!r}, expected one of {listed}. Choose one (--where)."
+            )
+        noted = (*self.notes, f"Only rows with {name} = {value}: {len(rows)} of {len(words)}.")
+        return dataclasses.replace(self, cells=self.cells[rows], lines=self.lines[rows], notes=noted)
 
     def refuse(self, column: int, bad: Bool[np.ndarray, " n"], expected: str) -> None:
         """Stop at the first bad cell of a column.

@@ -27,25 +27,47 @@ def recording(table: Table, columns: str | Mapping[str, str | int] | None, optio
     Raises:
         ReadError: a column is missing or doubtful, or a cell is not what it should be.
     """
+    if options.where is not None:
+        table = table.chosen(options.where)
     layout = assign(table, columns, options.quantity)
     angles, assumed = directions(table, layout.angles, options)
     theta_i, phi_i, theta_o, phi_o = angles.T
-    value = np.stack([table.numbers(column) for column in layout.values.values()], axis=1)
-    sigma = [table.numbers(column) for column in layout.sigmas.values()]
+    value, sigma = _stacked(table, layout.values), _stacked(table, layout.sigmas) if layout.sigmas else None
+    doubts = {"flagged invalid": np.broadcast_to(_flagged(table, layout.marks)[:, None], value.shape)}
+    if layout.quantity == "signal":
+        reference = _stacked(table, layout.references)
+        spread = _stacked(table, layout.reference_sigmas) if layout.reference_sigmas else None
+        doubts["reference reading not positive"] = ~(reference > 0)
+        value, sigma = _ratio((value, sigma), (np.where(reference > 0, reference, np.nan), spread))
     unused = (f"Columns not used: {', '.join(layout.unused)}.",) if layout.unused else ()
     found = Recording(
         source=table.source,
         wi=from_angles(theta_i, phi_i),
         wo=from_angles(theta_o, phi_o),
         value=value,
-        quantity=layout.quantity,
+        quantity="panel_ratio" if layout.quantity == "signal" else layout.quantity,
         channels=tuple(layout.values) if any(layout.values) else default_channels(1),
-        sigma=np.stack(sigma, axis=1) if sigma else None,
-        doubts={"flagged invalid": np.broadcast_to(_flagged(table, layout.marks)[:, None], value.shape)},
+        sigma=sigma,
+        doubts=doubts,
         notes=(*table.notes, *assumed, *unused),
     )
     labels = _labels(table, layout.marks)
     return found if labels is None else pivot(found, labels)
+
+
+def _stacked(table: Table, columns: Mapping[str, int]) -> np.ndarray:
+    return np.stack([table.numbers(column) for column in columns.values()], axis=1)
+
+
+def _ratio(
+    signal: tuple[np.ndarray, np.ndarray | None], reference: tuple[np.ndarray, np.ndarray | None]
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """y/r and its σ, √(σ_y² + (y/r σ_r)²)/r (JCGM 100:2008, eq. 10); a σ that is not given counts as 0."""
+    (y, sigma_y), (r, sigma_r) = signal, reference
+    if sigma_y is None and sigma_r is None:
+        return y / r, None
+    apart, shared = (np.zeros_like(y) if sigma is None else sigma for sigma in (sigma_y, sigma_r))
+    return y / r, np.hypot(apart, y / r * shared) / r
 
 
 def _flagged(table: Table, marks: Mapping[str, int]) -> np.ndarray:
