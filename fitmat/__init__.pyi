@@ -5,6 +5,8 @@ from .comparison import compare as compare
 from .energy import directional_albedo as directional_albedo
 from .energy import hemispherical_albedo as hemispherical_albedo
 from .errors import FitmatError as FitmatError
+from .examination import Examination as Examination
+from .examination import examine as examine
 from .fitting import fit as fit
 from .formats import read as read
 from .formats import write as write

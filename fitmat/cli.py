@@ -122,7 +122,7 @@ def simulate(
     seed: options.SimulatedSeed = 0,
     masking: options.Masking = None,
     catalogue: options.Catalogue = None,
-    force: options.SimulatedForce = False,
+    force: options.Replace = False,
 ) -> None:
     """Simulate measurements of a known material, to test an instrument's plan or fitmat itself."""
     _setup()
@@ -142,6 +142,51 @@ def simulate(
             out, truth, angles, noise=(noise, floor, seed), instrument=instrument, force=force
         )
     typer.echo("\n".join(str(path) for path in written))
+
+
+@app.command(
+    epilog="Examples:\n\n  fitmat check measurements.csv --plot coverage.png\n\n  fitmat check gold.binary --json"
+)
+@flags.takes(flags.reading, flags.instrument)
+def check(
+    reading: dict[str, Any],
+    instrument: Any,
+    file: options.File,
+    plot: options.Plot = None,
+    force: options.Replace = False,
+    json_: options.Json = False,
+) -> None:
+    """Describe a file before any fit: what was measured where, how consistently, and what can be learnt from it."""
+    _setup()
+    from fitmat import checking
+    from fitmat.formats import read
+
+    found = checking.checked(read(file, **reading, instrument=instrument), plot, force=force)
+    typer.echo(checking.as_json(found) if json_ else str(found))
+    if plot is None and not json_:
+        typer.echo(f"See what was measured where: fitmat check {file} --plot coverage.png")
+
+
+@app.command(
+    epilog="Examples:\n\n"
+    "  fitmat convert gold.binary gold.parquet\n\n"
+    "  fitmat convert scan.txt scan.bsdf --columns theta_i=AOI,brdf=4"
+)
+@flags.takes(flags.reading)
+def convert(
+    reading: dict[str, Any],
+    file: options.File,
+    out: options.Converted,
+    force: options.Replace = False,
+) -> None:
+    """Write measurements in another format; what that cannot hold is said."""
+    from fitmat.formats import read, writing
+
+    measurements = read(file, **reading)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        writing.write(measurements, out, force=force)
+    typer.echo("\n".join([str(measurements), *writing.losses(measurements, out), str(out)]))
 
 
 @app.command()

@@ -197,6 +197,18 @@ Dark = Annotated[
     ),
 ]
 
+Plot = Annotated[
+    Path | None,
+    typer.Option(help="Draw what was measured where into this PNG, SVG or PDF.", metavar="FILE", show_default=False),
+]
+
+Converted = Annotated[
+    Path,
+    typer.Argument(help="File to write: .csv, .parquet, .binary (MERL), .bsdf (Zemax) or .alta.", show_default=False),
+]
+
+Replace = Annotated[bool, typer.Option("--force", help="Replace the file where it exists.")]
+
 Ior = Annotated[
     str | None,
     typer.Option(
@@ -250,8 +262,6 @@ Catalogue = Annotated[
     Path | None,
     typer.Option(help="Write the catalogue of synthetic materials into this folder instead.", show_default=False),
 ]
-
-SimulatedForce = Annotated[bool, typer.Option("--force", help="Replace files that exist.")]
 
 Name = Annotated[
     str | None, typer.Argument(help="A lobe or model, e.g. ggx or lambert+ggx; 'fresnel' for the Fresnel terms.")

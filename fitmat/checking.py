@@ -1,0 +1,52 @@
+"""Checking: an examination as the command line shows it, with its picture.
+
+It finds nothing itself.
+"""
+
+import io
+import json
+import os
+from pathlib import Path
+
+from fitmat.errors import OutputError
+from fitmat.examination import Examination, examine
+from fitmat.examination.plots import figure
+from fitmat.folder import write_bytes
+from fitmat.measurement import Measurements
+
+PICTURES = ("png", "svg", "pdf")
+DPI = 150
+
+
+def checked(measurements: Measurements, plot: Path | None, *, force: bool) -> Examination:
+    """Examine measurements and draw them.
+
+    Args:
+        measurements: What to examine.
+        plot: The picture to write, or None.
+        force: Replace it where it exists.
+
+    Raises:
+        OutputError: the picture exists and `force` is off, has no suffix of a picture, or cannot be written.
+    """
+    if plot is not None and os.path.lexists(plot) and not force:
+        raise OutputError(f"{plot}: already exists; choose another name, or --force to replace it.")
+    found = examine(measurements)
+    if plot is not None:
+        write_bytes(plot, _drawn(found, plot))
+    return found
+
+
+def _drawn(found: Examination, plot: Path) -> bytes:
+    """The picture in the format of the file's suffix."""
+    kind = plot.suffix.lower().removeprefix(".")
+    if kind not in PICTURES:
+        raise OutputError(f"{plot}: no picture, expected a name that ends in {', '.join(PICTURES)}. Rename it.")
+    buffer = io.BytesIO()
+    figure(found).savefig(buffer, format=kind, dpi=DPI, bbox_inches="tight")
+    return buffer.getvalue()
+
+
+def as_json(found: Examination) -> str:
+    """Everything that was found, as one JSON object."""
+    return json.dumps(found.as_dict(), indent=2, ensure_ascii=False, allow_nan=False)
