@@ -7,6 +7,7 @@ from .energy import hemispherical_albedo as hemispherical_albedo
 from .errors import FitmatError as FitmatError
 from .examination import Examination as Examination
 from .examination import examine as examine
+from .examination.plots import plot_examination as plot_examination
 from .fitting import fit as fit
 from .formats import read as read
 from .formats import write as write

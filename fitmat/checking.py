@@ -10,7 +10,7 @@ from pathlib import Path
 
 from fitmat.errors import OutputError
 from fitmat.examination import Examination, examine
-from fitmat.examination.plots import figure
+from fitmat.examination.plots import plot_examination
 from fitmat.folder import write_bytes
 from fitmat.measurement import Measurements
 
@@ -31,20 +31,15 @@ def checked(measurements: Measurements, plot: Path | None, *, force: bool) -> Ex
     """
     if plot is not None and os.path.lexists(plot) and not force:
         raise OutputError(f"{plot}: already exists; choose another name, or --force to replace it.")
+    kind = None if plot is None else plot.suffix.lower().removeprefix(".")
+    if kind is not None and kind not in PICTURES:
+        raise OutputError(f"{plot}: no picture, expected a name that ends in {', '.join(PICTURES)}. Rename it.")
     found = examine(measurements)
     if plot is not None:
-        write_bytes(plot, _drawn(found, plot))
+        buffer = io.BytesIO()
+        plot_examination(found).savefig(buffer, format=kind, dpi=DPI, bbox_inches="tight")
+        write_bytes(plot, buffer.getvalue())
     return found
-
-
-def _drawn(found: Examination, plot: Path) -> bytes:
-    """The picture in the format of the file's suffix."""
-    kind = plot.suffix.lower().removeprefix(".")
-    if kind not in PICTURES:
-        raise OutputError(f"{plot}: no picture, expected a name that ends in {', '.join(PICTURES)}. Rename it.")
-    buffer = io.BytesIO()
-    figure(found).savefig(buffer, format=kind, dpi=DPI, bbox_inches="tight")
-    return buffer.getvalue()
 
 
 def as_json(found: Examination) -> str:

@@ -81,12 +81,13 @@ def fit(
     """Fit models to a file of measurements and write a report with the Phong–microfacet match."""
     _setup()
     from fitmat import conditions, console, folder, report
-    from fitmat.formats import read
+    from fitmat.measurement import Measurements
     from fitmat.params import assignments
 
     names, fixed = console.model_names(models), assignments(fix or [], "--fix")
-    measurements = read(file, **reading, instrument=instrument)
-    known = conditions.prepared(names, measurements, ior=ior, tilt=tilt)
+    measurements = console.source(file, reading | {"instrument": instrument})
+    shown = measurements if isinstance(measurements, Measurements) else measurements.part
+    known = conditions.prepared(names, shown, ior=ior, tilt=tilt)
     target = out or folder.default(file)
     with folder.new(target, force=force, stale=report.POSTERIOR.format("*")) as draft:
         _leave_on_interrupt(draft)

@@ -5,7 +5,7 @@ Progress goes to stderr, results to stdout; nothing is computed here.
 
 import contextlib
 import signal
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import FrameType
@@ -18,14 +18,23 @@ from rich.table import Table
 from rich.text import Text
 
 from fitmat.brdf import LOBES, lobe_names, model, normalised
+from fitmat.bulk import fit_chunks
 from fitmat.comparison import Comparison, compare, is_empirical, is_microfacet
 from fitmat.errors import ModelError
+from fitmat.formats import chunks, read
 from fitmat.measurement import Measurements
 from fitmat.outcome import RESULTS
 from fitmat.params import entries
 from fitmat.posterior import Posterior
 from fitmat.report import rows
-from fitmat.uncertainty import laplace_each, sample
+from fitmat.rows import Rows, held
+from fitmat.uncertainty import laplace, laplace_each, sample
+
+MOST_AT_ONCE = 100_000
+"""Rows above which a fit passes over the data block by block."""
+
+MOST_SAMPLED = 50_000
+"""Values above which nothing is sampled: a step takes seconds, and Laplace's approximation is as good."""
 
 
 def model_names(text: str) -> list[str]:
@@ -36,8 +45,21 @@ def model_names(text: str) -> list[str]:
     return list(dict.fromkeys(names))
 
 
+def source(file: Path, reading: Mapping[str, Any]) -> Measurements | Rows:
+    """The measurements of a file: in memory where they are few, else to be passed over, with a progress bar on stderr.
+
+    Raises:
+        ReadError: as `fitmat.read`.
+    """
+    if chunks.is_large(file):
+        with _bar() as bar:
+            return chunks.scan(file, **reading, progress=_passes(bar, f"reading {file.name}"))
+    measurements = read(file, **reading)
+    return held(measurements) if measurements.n_samples > MOST_AT_ONCE else measurements
+
+
 def study(
-    measurements: Measurements,
+    measurements: Measurements | Rows,
     known: Mapping[str, Mapping[str, np.ndarray]],
     *,
     fixed: Mapping[str, np.ndarray],
@@ -48,29 +70,48 @@ def study(
     """Fit, sample and compare, with a progress bar on stderr.
 
     Args:
-        measurements: What to fit.
+        measurements: What to fit; `Rows` are passed over, and models fitted one after the other.
         known: Model name → parameters that are known of it beforehand (`conditions.prepared`).
         fixed: Parameters to hold in every model that has them; at least one must.
         masking: The same for the masking.
-        sampling: Whether to sample; else Laplace's approximation.
+        sampling: Whether to sample; else, and for more than `MOST_SAMPLED` values, Laplace's approximation.
         seed: Of the sampling.
 
     An interrupt during sampling keeps what was done and leaves the remaining models to Laplace's approximation.
     """
-    names = list(known)
-    screen = Console(stderr=True)
-    parts = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*parts, console=screen, transient=True, disable=not screen.is_terminal) as bar:
-        fitting = bar.add_task(f"fitting {', '.join(names)}", total=None)
-        jobs = {name: _options(name, known, fixed, masking) for name in names}
-        first = laplace_each(measurements, jobs, seed=seed)
-        bar.update(fitting, total=1, completed=1)
+    jobs = {name: _options(name, known, fixed, masking) for name in known}
+    with _bar() as bar:
+        if isinstance(measurements, Measurements):
+            fitting = bar.add_task(f"fitting {', '.join(jobs)}", total=None)
+            first = laplace_each(measurements, jobs, seed=seed)
+            bar.update(fitting, total=1, completed=1)
+        else:
+            first = [
+                laplace(fit_chunks(measurements, name, **job, progress=_passes(bar, f"fitting {name}")), seed=seed)
+                for name, job in jobs.items()
+            ]
         with ThreadPoolExecutor(1) as pool:
             # The match of the approximations: the answer without sampling, and compiled for the one with it.
             match = pool.submit(_match, first)
-            posteriors = _sampled(first, bar, seed) if sampling else first
+            few = first[0].fit.n_values <= MOST_SAMPLED
+            posteriors = _sampled(first, bar, seed) if sampling and few else first
             bar.add_task("comparing", total=None)
             return posteriors, match.result() if posteriors == first else _match(posteriors)
+
+
+def _bar() -> Progress:
+    """A progress bar on stderr, where that is a terminal."""
+    screen = Console(stderr=True)
+    parts = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    return Progress(*parts, console=screen, transient=True, disable=not screen.is_terminal)
+
+
+def _passes(bar: Progress, what: str) -> Callable[[str, int, int], None]:
+    """A bar that follows passes over a large file."""
+    task = bar.add_task(what, total=None)
+    return lambda step, done, total: bar.update(
+        task, description=f"{what}: {step}", completed=done, total=total or None
+    )
 
 
 def _sampled(first: Sequence[Posterior], bar: Progress, seed: int) -> list[Posterior]:
@@ -145,6 +186,9 @@ def show(posteriors: Sequence[Posterior], match: Comparison | None, folder: Path
     m = posteriors[0].fit.measurements
     out.print(str(m), markup=False, highlight=False)
     out.print(posteriors[0].fit.noise.words, markup=False, highlight=False)
+    if posteriors[0].fit.n_values > MOST_SAMPLED:
+        words = f"More than {MOST_SAMPLED:,} values: intervals from Laplace's approximation, nothing is sampled."
+        out.print(words, highlight=False)
     for posterior in posteriors:
         out.print(f"\n[bold]{_title(posterior)}[/bold]", highlight=False)
         out.print(_table(posterior))

@@ -3,6 +3,7 @@
 Gives the best parameters, how sure the data are of them locally (covariance), and what to think of the result.
 """
 
+import dataclasses
 from collections.abc import Mapping
 
 import equinox as eqx
@@ -110,7 +111,7 @@ def _seen(template: AbstractBRDF, m: Measurements) -> AbstractBRDF:
     dark = np.quantile((m.value * m.wo[:, 2:])[m.valid], 0.01)
     return Seen(
         template,
-        m.instrument,
+        dataclasses.replace(m.instrument, calibration=0.0),  # static: each value would be compiled for
         scale=jnp.ones(()) if m.instrument.calibration else None,
         dark=jnp.clip(0.5 * dark, 1e-6, 0.5) if m.instrument.dark is None else None,
     )

@@ -83,7 +83,8 @@ class Data(eqx.Module):
     def every(self, stride: int) -> "Data":
         """Each stride-th row, under the same prior."""
         arrays = (self.wi, self.wo, self.x, self.noise, self.kappa, self.weight)
-        return Data(*(part[::stride] for part in arrays), self.prior)
+        wi, wo, x, noise, kappa, weight = (part[::stride] for part in arrays)
+        return Data(wi, wo, x, noise, kappa, weight, self.prior)
 
 
 def prepare(m: Measurements, noise: Noise, prior: Prior | None = None) -> Data:
@@ -97,7 +98,9 @@ def prepare(m: Measurements, noise: Noise, prior: Prior | None = None) -> Data:
     kappa = m.wi[:, 2:3]
     parts = (m.wi, m.wo, m.value * kappa, sigma * kappa, kappa, m.valid.astype(float))
     extra = padded_length(len(kappa)) - len(kappa)
-    return Data(*(jnp.asarray(_padded(part, extra, fill)) for part, fill in zip(parts, _FILL, strict=True)), prior)
+    padded = (jnp.asarray(_padded(part, extra, fill)) for part, fill in zip(parts, _FILL, strict=True))
+    wi, wo, x, deviation, kappa, weight = padded
+    return Data(wi, wo, x, deviation, kappa, weight, prior)
 
 
 _FILL = ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 0.0, 1.0, 1.0, 0.0)

@@ -17,10 +17,17 @@ MIN_RESIDUALS = 12
 UNKNOWN_RELATIVE = 1e-3
 """Placeholder noise where none can be estimated: small, so that the inferred discrepancy takes its place."""
 
+UNKNOWN = (
+    "Noise unknown: too few repeats or neighbouring angles, or exact copies; all scatter is counted as model misfit."
+)
+"""What is said where no noise can be estimated."""
+
 COPIED = 1e-12
 """A scatter below this fraction of the maximum is that of copied rows, not of repeated measurements."""
 
 _DIGITS = 4
+_UNEVEN = 12.0
+# Ratio of the gaps between five angles from which they are no curve but samples that meet by chance.
 _T_DOF = 4.0
 # Scale of a t distribution with 4 degrees of freedom that fits Gaussian data best: the root s of
 # E[5 x²/(4 s² + x²)] = 1 for x ~ N(0, 1).
@@ -55,7 +62,7 @@ def measured_noise(m: Measurements) -> Noise:
         return Noise(np.where(m.valid, m.sigma, 1.0), True, "Measurement noise as given in the file.")
     sigma, words = np.ones_like(m.value), []
     for k, channel in enumerate(m.channels):
-        level, error, factor = _leave_one_out(m, k)
+        level, error, factor = leave_one_out(m, k)
         used = np.isfinite(error)
         smooth = np.where(np.isfinite(level), np.abs(level), np.abs(m.value[:, k]))
         top = float(np.max(np.abs(m.value[m.valid[:, k], k]), initial=0.0))
@@ -63,17 +70,12 @@ def measured_noise(m: Measurements) -> Noise:
             sigma[:, k] = UNKNOWN_RELATIVE * np.maximum(smooth, UNKNOWN_RELATIVE * max(top, 1e-12))
             words.append("")
             continue
-        a, b = _components(error[used], smooth[used], factor[used])
+        a, b = components(error[used], smooth[used], factor[used])
         sigma[:, k] = np.hypot(a, b * smooth)
         named = f" ({channel})" if len(m.channels) > 1 else ""
         words.append(f"{100 * b:.2g} % + {a:.2g} sr⁻¹{named}")
     if not all(words):
-        return Noise(
-            sigma,
-            False,
-            "Noise unknown: too few repeats or neighbouring angles, or exact copies; "
-            "all scatter is counted as model misfit.",
-        )
+        return Noise(sigma, False, UNKNOWN)
     return Noise(sigma, True, f"Noise estimated from neighbouring angles: {'; '.join(words)}.")
 
 
@@ -95,7 +97,7 @@ def _curves(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray, np.n
     return rows[order], curve[order], angle[order]
 
 
-def _leave_one_out(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def leave_one_out(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Per row: the level predicted without it, its error, and the variance of that error in units of σ².
 
     NaN where a row has neither repeats nor two neighbours on either side.
@@ -118,6 +120,9 @@ def _leave_one_out(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarra
     inner = inner[(curve[inner - 2] == curve[inner + 2])] if len(x) > 4 else inner[:0]
     near = inner[:, None] + np.array([-2, -1, 1, 2])
     scale = np.median(np.abs(y)) or 1.0
+    gaps = np.diff(x[inner[:, None] + np.arange(-2, 3)], axis=1)
+    even = gaps.max(axis=1, initial=0.0) <= _UNEVEN * gaps.min(axis=1, initial=np.inf)
+    inner, near = inner[even], near[even]
     weights = _lagrange(x[near], x[inner])
     predicted = scale * np.sinh((weights * np.arcsinh(mean[near] / scale)).sum(axis=1))
     single = count[inner] == 1
@@ -136,7 +141,7 @@ def _lagrange(nodes: np.ndarray, at: np.ndarray) -> np.ndarray:
     )
 
 
-def _components(error: np.ndarray, level: np.ndarray, factor: np.ndarray) -> tuple[float, float]:
+def components(error: np.ndarray, level: np.ndarray, factor: np.ndarray) -> tuple[float, float]:
     """a (sr⁻¹) and b (relative) of σ² = a² + (b f)² by maximum likelihood under a t distribution."""
     typical = np.median(np.abs(error)) / 0.6745 + 1e-300
     relative = np.median(np.abs(error) / np.maximum(level, 1e-300)) / 0.6745 + 1e-12

@@ -160,6 +160,8 @@ UnknownScale = Annotated[
 Calibration = Annotated[
     float,
     typer.Option(
+        min=0,
+        max=1,
         help="Relative standard deviation of a scale error that all values share, such as 0.03.",
         metavar="X",
         show_default=False,
@@ -170,6 +172,8 @@ Calibration = Annotated[
 SourceAngle = Annotated[
     float,
     typer.Option(
+        min=0,
+        max=30,
         help="Half-angle of the cone in which light reaches the sample, in degrees.",
         metavar="DEG",
         show_default=False,
@@ -180,6 +184,8 @@ SourceAngle = Annotated[
 ReceiverAngle = Annotated[
     float,
     typer.Option(
+        min=0,
+        max=30,
         help="Half-angle of the cone that the detector collects, in degrees.",
         metavar="DEG",
         show_default=False,

@@ -4,30 +4,24 @@ Finds nothing itself; `fitting` does.
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat.brdf import AbstractBRDF
 from fitmat.display import html_table, text_table, with_error
-from fitmat.likelihood import Data, every_residual, noise_scale
+from fitmat.information import FOLLOWS, MISSES, covariance, information
+from fitmat.likelihood import Data, noise_scale
 from fitmat.measurement import Measurements
 from fitmat.noise import Noise
 from fitmat.params import Entry, entries, space, vector, with_vector
 
 AGREE = 0.1
 """Starts whose log-likelihood is within this of the best have found the same optimum."""
-
-UNDETERMINED = {"log": 1.0, "linear": 0.3}
-"""A parameter whose standard deviation exceeds this (in ln p, or as a fraction of its range) is not determined."""
-
-FOLLOWS, MISSES = 0.5, 2.0
-"""Ratios of discrepancy to noise up to which a model follows the data, and from which it is inadequate."""
 
 RESULTS = {
     "converged": "Converged.",
@@ -62,6 +56,8 @@ class Fit:
         information: Of the natural coordinates (logarithm where the scale is log), (p, p).
         covariance: Of all physical parameters, (p, p); 0 for fixed ones, NaN for those on a bound.
         undetermined: Names of parameters that these data do not determine.
+        n_values: Values that were fitted; more than `measurements` holds where these are a part of a large file.
+        discrepancy_sd: Standard deviation of s where it is known from all values of a large file; else None.
     """
 
     name: str
@@ -79,6 +75,8 @@ class Fit:
     information: Float[np.ndarray, "p p"]
     covariance: Float[np.ndarray, "p p"]
     undetermined: tuple[str, ...]
+    n_values: int
+    discrepancy_sd: float | None = None
 
     @property
     def entries(self) -> tuple[Entry, ...]:
@@ -144,13 +142,13 @@ class Fit:
     @property
     def aicc(self) -> float:
         """Akaike's criterion with the small-sample correction (Hurvich & Tsai 1989); discrepancy counted."""
-        n, k = self.measurements.n_valid, len(self.free) + 1
+        n, k = self.n_values, len(self.free) + 1
         return 2 * k - 2 * self.log_likelihood + 2 * k * (k + 1) / max(n - k - 1, 1)
 
     @property
     def bic(self) -> float:
         """Schwarz's criterion; discrepancy counted."""
-        return (len(self.free) + 1) * np.log(self.measurements.n_valid) - 2 * self.log_likelihood
+        return (len(self.free) + 1) * np.log(self.n_values) - 2 * self.log_likelihood
 
 
 def free_places(template: AbstractBRDF, held: Mapping[str, Any]) -> np.ndarray:
@@ -186,9 +184,9 @@ def conclude(
     s = float(ends.discrepancy[k])
     free = free_places(template, held)
     bounds = space(template).at_bound(np.asarray(ends.values[k]))
-    information = _information(best, data, s, free)
+    known = information(best, data, s, free)
     told = np.zeros(len(free), bool) if data.prior is None else np.asarray(data.prior.precision)[free] > 0
-    covariance, undetermined = _uncertainty(best, information, free, told)
+    spread, undetermined = covariance(best, known, free, told)
     return Fit(
         name=template.name,
         model=best,
@@ -197,18 +195,20 @@ def conclude(
         data=data,
         discrepancy=s,
         held=held,
-        result=_outcome(bool(usable[k]), bool(ends.solved[k]), bool(bounds[free].any()), undetermined),
+        result=named_outcome(bool(usable[k]), bool(ends.solved[k]), bool(bounds[free].any()), undetermined),
         steps=int(ends.steps[k]),
         n_starts=len(scores),
         n_starts_agreeing=int(np.count_nonzero(scores > scores[k] - AGREE)) if usable[k] else 0,
         log_likelihood=float(ends.log_likelihood[k]),
-        information=information,
-        covariance=covariance,
+        information=known,
+        covariance=spread,
         undetermined=undetermined,
+        n_values=m.n_valid,
     )
 
 
-def _outcome(usable: bool, solved: bool, on_bound: bool, undetermined: tuple[str, ...]) -> str:
+def named_outcome(usable: bool, solved: bool, on_bound: bool, undetermined: tuple[str, ...]) -> str:
+    """The key of `RESULTS` that says how a fit ended."""
     if not usable:
         return "nonfinite"
     if undetermined:
@@ -216,85 +216,3 @@ def _outcome(usable: bool, solved: bool, on_bound: bool, undetermined: tuple[str
     if on_bound:
         return "at_bound"
     return "converged" if solved else "max_steps"
-
-
-def _cost_terms(best: AbstractBRDF, data: Data, s: Array) -> tuple[Callable[[Array], Array], Array]:
-    """The residuals as a function of the natural coordinates, and those of `best`."""
-    coordinates = space(best)
-    at = coordinates.natural(vector(best))
-    return lambda t: every_residual(with_vector(best, coordinates.physical(t)), data, s), at
-
-
-@eqx.filter_jit
-def _expected_information(best: AbstractBRDF, data: Data, s: Array) -> Array:
-    """JᵀJ in natural coordinates, (p, p)."""
-    residual, at = _cost_terms(best, data, s)
-    jacobian = jax.jacfwd(residual)(at)
-    return jacobian.T @ jacobian
-
-
-@eqx.filter_jit
-def _observed_information(best: AbstractBRDF, data: Data, s: Array) -> Array:
-    """The Hessian of ½Σ residual² in natural coordinates, (p, p); compiles three times as long as JᵀJ."""
-    residual, at = _cost_terms(best, data, s)
-    return jax.jacfwd(jax.jacfwd(lambda t: 0.5 * jnp.sum(residual(t) ** 2)))(at)
-
-
-def _information(best: AbstractBRDF, data: Data, s: float, free: np.ndarray) -> Float[np.ndarray, "p p"]:
-    """The expected information where the model follows the data, else the observed one if it is positive definite.
-
-    For a model that is right they differ by chance only. For one that is not, the residuals are large and their
-    curvature counts: it may determine what the Jacobian alone does not (Efron & Hinkley 1978).
-    """
-    expected = np.asarray(_expected_information(best, data, jnp.asarray(s)))
-    if s < FOLLOWS * float(noise_scale(data)):
-        return expected
-    observed = np.asarray(_observed_information(best, data, jnp.asarray(s)))
-    part = observed[np.ix_(free, free)]
-    scale = np.sqrt(np.abs(np.diagonal(part)) + 1e-300)
-    positive = np.isfinite(part).all() and np.linalg.eigvalsh(part / np.outer(scale, scale)).min(initial=1.0) > 1e-9
-    return observed if positive else expected
-
-
-def inverse_information(information: np.ndarray, span: np.ndarray) -> np.ndarray:
-    """The inverse of an information matrix, huge but finite along directions that the data do not determine.
-
-    Args:
-        information: In natural coordinates, (k, k).
-        span: Widths of the bounds in the same coordinates, (k,); they set the scale of "huge".
-    """
-    scaled = np.nan_to_num(information * np.outer(span, span))
-    unit = np.sqrt(np.maximum(np.diagonal(scaled), 1e-12))
-    eigenvalues, vectors = np.linalg.eigh(scaled / np.outer(unit, unit))
-    size = span / unit
-    return (vectors / np.maximum(eigenvalues, 1e-14)) @ vectors.T * np.outer(size, size)
-
-
-def _uncertainty(
-    best: AbstractBRDF, information: np.ndarray, free: np.ndarray, told: np.ndarray
-) -> tuple[Float[np.ndarray, "p p"], tuple[str, ...]]:
-    """The covariance in physical parameters, and what is not determined.
-
-    What is determined is judged with every free parameter released, those on a bound as well: a fit that slid along a
-    degenerate direction until it met a bound knows no more for that. Only where all are determined are the parameters
-    on a bound held there. Parameters of which a prior tells (`told`, as `free`) count as known in the judgement.
-    """
-    coordinates, values = space(best), np.asarray(vector(best))
-    span = coordinates.natural_upper - coordinates.natural_lower
-    released = inverse_information(information[np.ix_(free, free)], span[free])
-    limit = np.where(coordinates.log, UNDETERMINED["log"], UNDETERMINED["linear"] * span)
-    judged = free[~told]
-    apart = released if not told.any() else inverse_information(information[np.ix_(judged, judged)], span[judged])
-    loose = set(judged[~(np.sqrt(np.diagonal(apart)) <= limit[judged])])
-    on_bound = (coordinates.at_bound(values) != 0) & np.isin(np.arange(len(values)), free)
-    inside = free[~on_bound[free]]
-    if loose:
-        natural = released[np.ix_(~on_bound[free], ~on_bound[free])]
-    else:
-        natural = inverse_information(information[np.ix_(inside, inside)], span[inside])
-    slope = np.where(coordinates.log, values, 1.0)[inside]
-    covariance = np.zeros((len(values), len(values)))
-    covariance[np.ix_(inside, inside)] = natural * np.outer(slope, slope)
-    covariance[on_bound, :] = covariance[:, on_bound] = np.nan
-    names = tuple(e.name for e in entries(best) if loose & set(range(e.place.start, e.place.stop)))
-    return covariance, names

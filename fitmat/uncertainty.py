@@ -20,9 +20,10 @@ from fitmat import fitting
 from fitmat.apparent import Apparent, apparent
 from fitmat.brdf import AbstractBRDF
 from fitmat.errors import FitmatError
+from fitmat.information import inverse_information
 from fitmat.likelihood import Data, log_density, mapped, noise_scale
 from fitmat.measurement import Measurements
-from fitmat.outcome import Fit, inverse_information
+from fitmat.outcome import Fit
 from fitmat.params import space, vector, with_vector
 from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, Diagnostics, Posterior, split_rhat
 
@@ -254,6 +255,8 @@ def _discrepancy_sd(fit: Fit) -> float:
 
     That is σ of a Gaussian, and also the mean of the exponential that s follows where its best value is 0.
     """
+    if fit.discrepancy_sd is not None:
+        return fit.discrepancy_sd
     unit = max(float(noise_scale(fit.data)), 1e-12)
     moves = np.sort(np.concatenate([unit * 2.0 ** np.arange(-12, 12), fit.discrepancy * 2.0 ** np.arange(-6, 2)]))
     moves = moves[moves > 0]

@@ -155,6 +155,13 @@ def test_bounds_of_every_value_may_be_stated_by_one_number(write):
     assert found.value.tolist() == [[0.1, 0.2]]
 
 
+def test_a_direction_without_its_azimuth_is_missing(write):
+    head = "#DIM 4 1\n#PARAM_IN SPHERICAL_TL_PL_TV_PV\n#PARAM_OUT INV_STERADIAN\n"
+    found = reader.read(write(head + "0.5 0 0.25 nan 1\n0.5 nan 0.25 1 1\n0.5 0 0.25 1 1\n"))
+    assert found.valid[:, 0].tolist() == [False, False, True]
+    assert found.masked == {"angle missing or infinite": 2}
+
+
 def test_vectors_off_unit_length_are_missing(write):
     text = (
         "#DIM 6 1\n#PARAM_IN CARTESIAN\n#PARAM_OUT INV_STERADIAN\n0 0 1.0001 0 0 1 2\n0 0 0.5 0 0 1 2\n0 0 0 0 0 1 2\n"

@@ -82,6 +82,13 @@ def test_the_cosine_is_divided_out(write):
     np.testing.assert_allclose(found.value, [[1.0]], rtol=EXACT)
 
 
+def test_a_direction_without_its_azimuth_is_missing(write):
+    rows = "0.5,0,0.25,nan,1\n0.5,nan,0.25,1,1\n0.5,0,0.25,1,1\n"
+    found = reader.read(write("VARS theta_i,phi_i,theta_s,phi_s,Integrated\n" + rows))
+    assert found.valid[:, 0].tolist() == [False, False, True]
+    assert found.masked == {"angle missing or infinite": 2}
+
+
 BAD: dict[str, tuple[str, str]] = {
     "degrees": (
         EXAMPLE.replace("0.25,4.1", "45,4.1"),

@@ -182,6 +182,24 @@ def test_bad_sources(source, message):
         read(source)
 
 
+def test_odd_names_and_texts_are_shown_plainly():
+    """Halves of characters, which UTF-8 cannot hold, structures, and names that a terminal would obey."""
+    angles = {"theta_i": [30.0], "theta_o": [30.0]}
+    with pytest.raises(ReadError, match=r"row 1: brdf = \?, expected a number"):
+        read({**angles, "brdf": np.array(["\ud800"])})
+    with pytest.raises(ReadError, match=r"column brdf is not an array .*, expected \(n,\) numbers or texts"):
+        read({**angles, "brdf": np.zeros(1, [("a", float), ("b", int)])})
+    with pytest.raises(ReadError, match=r"the columns are theta_i, theta_o, a b, �\[2J, expected a measured"):
+        read({**angles, "a\n b": [1.0], "\x1b[2J": [1.0]})
+
+
+def test_readings_that_overflow_are_masked():
+    """∞ · 0 in the σ of a ratio is no number, not a warning."""
+    signals = {"signal": [np.inf, 1e308, 1.0], "reference": [1.0, 1e-5, 2.0], "sigma": [0.1] * 3}
+    found = read({"theta_i": [30.0] * 3, "theta_o": [30.0] * 3, **signals, "sigma_reference": [0.0, 0.1, 0.1]}, panel=1)
+    assert found.valid[:, 0].tolist() == [False, False, True]
+
+
 def test_missing_file(tmp_path):
     with pytest.raises(ReadError, match=r"none\.csv: no such file, expected measurements"):
         read(tmp_path / "none.csv")

@@ -141,6 +141,19 @@ def test_bad_files_are_refused_in_a_sentence(write, text, message):
         fred.load(write(text))
 
 
+@pytest.mark.parametrize(("unit", "row"), [("deg", "20 nan 1"), ("rad", "nan 1 1"), ("sin", "0.5 nan 1")])
+def test_a_direction_without_one_of_its_angles_is_missing(write, unit, row):
+    found = reader.read(write(f"type bsdf_data\nformat angles={unit}\n0.1 0\n0.2 0.3 1\n{row}\n"))
+    assert found.valid[:, 0].tolist() == [True, False]
+    assert found.masked == {"angle missing or infinite": 1}
+
+
+def test_rounded_cosines_beyond_the_horizon_are_on_it(write):
+    found = fred.load(write("type bsdf_data\nformat angles=sin\n0 0\n0.6 0.8000005 1\n0 0 1\n"))
+    np.testing.assert_allclose(np.linalg.norm(found.wo, axis=1), 1, rtol=EXACT)
+    assert found.wo[0, 2] == 0
+
+
 def test_an_overlong_second_line_takes_no_time(write):
     begin = time.process_time()
     with pytest.raises(ReadError, match="expected a mirror direction"):

@@ -445,6 +445,10 @@ WRONG = {
     "negative vndf": (GOOD | {"vndf": -GOOD["vndf"]}, "vndf has negative densities, expected none"),
     "degrees": (GOOD | {"theta_i": single(0, 60)}, "theta_i runs from 0 to 60, expected radians, 0 to π/2"),
     "below the surface": (GOOD | {"theta_i": single(-1, 1)}, "theta_i runs from -1 to 1, expected radians"),
+    "a little below the surface": (
+        GOOD | {"theta_i": single(-1e-20, 1)},
+        "theta_i runs from -1e-20 to 1, expected radians",
+    ),
     "same incidence": (GOOD | {"theta_i": single(1, 1)}, "theta_i does not increase, expected radians, 0 to π/2, in"),
     "phi in degrees": (GOOD | {"phi_i": single(-180, -90, 0)}, "phi_i runs from -180 to 0, expected radians"),
     "a third": (GOOD | {"phi_i": single(-1, 0, 1.09)}, "phi_i runs from -57.3 to 62.45 degrees, expected a circle, or"),

@@ -163,7 +163,9 @@ def _agreement(m: Measurements, sigma: np.ndarray, found: tuple, known: bool) ->
     # A lobe a few steps wide changes by about its own value within a step: where directions do not quite match,
     # the mismatch over the tolerance, times the value, is added to the noise.
     slack = np.where(distance > _EXACT, distance / TOLERANCE[1], 0.0)[:, None] * np.maximum(np.abs(y), np.abs(z))
-    squares = np.minimum((y - z) ** 2 / (sigma[a] ** 2 + sigma[b] ** 2 + slack**2), CUT**2)
+    with np.errstate(over="ignore"):
+        spread = np.maximum(np.hypot(np.hypot(sigma[a], sigma[b]), slack), np.finfo(float).tiny)
+        squares = np.minimum(np.abs((y - z) / spread), CUT) ** 2
     # Channels share what is wrong with a direction: they count as one measurement, by their mean square.
     each = both.sum(axis=1)
     square = (squares * both).sum(axis=1)[each > 0] / each[each > 0]

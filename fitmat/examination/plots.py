@@ -33,7 +33,7 @@ CROWDED = 60
 """Curves of more points than this are drawn without markers."""
 
 
-def figure(examination: Examination, *, channel: int | None = None) -> Figure:
+def plot_examination(examination: Examination, *, channel: int | None = None) -> Figure:
     """Maps of the hemisphere for up to `MAPS` incidences, and the in-plane curves where there are any.
 
     Args:

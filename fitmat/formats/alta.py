@@ -66,7 +66,7 @@ def load(path: str | os.PathLike[str]) -> Recording:
         got = f"coordinates {', '.join(f'{x:g}' for x in number[row, :given])}"
         expected = f"none beyond ±{_LARGEST:.4g}, since ALTA's angles are radians"
         raise ReadError(f"{body.where(row)}: {got}, expected {expected}. Convert them.")
-    wi, wo = PARAMETRISATIONS[known][1](number[:, :given])
+    wi, wo = map(blocks.placed, PARAMETRISATIONS[known][1](number[:, :given]))
     channels = _CHANNELS.get(output, default_channels(values))
     if len(named := header.get("CHANNELS", "").split()) == values == len(set(named)):
         channels = tuple(named)

@@ -62,8 +62,8 @@ def load(path: str | os.PathLike[str]) -> Recording:
             raise ReadError(f"{below.where(bad)}: {got}. {remedy}.")
     return Recording(
         source=source,
-        wi=from_angles(angles["theta_i"], angles.get("phi_i", np.zeros(len(table)))),
-        wo=from_angles(angles["theta_o"], angles["phi_o"]),
+        wi=blocks.placed(from_angles(angles["theta_i"], angles.get("phi_i", np.zeros(len(table))))),
+        wo=blocks.placed(from_angles(angles["theta_o"], angles["phi_o"])),
         value=np.delete(table, [names.index(name) for name in ANGLES if name in names], axis=1),
         quantity=quantity,
         channels=channels,

@@ -13,12 +13,12 @@ import polars as pl
 from jaxtyping import Bool, Float, Int
 
 from fitmat.errors import ReadError
+from fitmat.formats.files import shown as shown
 from fitmat.geometry import from_angles
 
 _BOM = b"\xef\xbb\xbf"
 _WORD = r"^[A-Za-z]"
 _NO_WORD = r"^(?i)(nan|inf|infinity)(\s|$)"
-_LONGEST = 40
 _TURN = 2 * np.pi
 _SAME = 1e-9
 
@@ -27,12 +27,6 @@ def begins(head: bytes, *patterns: bytes) -> bool:
     """Whether each pattern stands at the beginning of a line, whatever its letter case and line ends."""
     text = head.removeprefix(_BOM).replace(b"\r", b"\n")
     return all(re.search(rb"(?im)^[ \t]*" + pattern, text) for pattern in patterns)
-
-
-def shown(word: str) -> str:
-    """A word or line of the file as a message shows it."""
-    word = " ".join(word.split())
-    return word[:_LONGEST] + ("…" if len(word) > _LONGEST else "")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -221,6 +215,11 @@ def sections(text: str, source: str, known: Collection[str]) -> Sections:
     below[~worded] = count
     start = np.append((np.cumsum(below) - below)[worded], len(number))
     return Sections(heads, key, parts.to_series(1).fill_null(""), start, number)
+
+
+def placed(w: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3"]:
+    """Directions, NaN throughout where one of their angles is missing, be it the azimuth alone."""
+    return np.where(np.isnan(w).any(axis=-1, keepdims=True), np.nan, w)
 
 
 def around(

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from fitmat.errors import ReadError
+from fitmat.formats.files import listed
 from fitmat.formats.quantity import QUANTITIES
 from fitmat.formats.table import Table
 
@@ -41,7 +42,7 @@ EXAMPLE = 'columns="theta_i=Zenith,theta_o=3" (--columns)'
 _BESIDE = ("sigma", "reference", "sigma_reference")
 _KINDS = {alias: kind for kind, others in ALIASES.items() for alias in (kind, *others)}
 _GREEK = str.maketrans({"θ": "theta", "ϑ": "theta", "φ": "phi", "ϕ": "phi", "λ": "lambda", "σ": "sigma"})
-_UNIT = re.compile(r"\s*[\[(](deg|degrees?|°|1/sr|sr-1|sr\^-1|sr\^\{-1\}|sr⁻¹|nm)[\])]\s*$")
+_UNIT = re.compile(r" ?[\[(](deg|degrees?|°|1/sr|sr-1|sr\^-1|sr\^\{-1\}|sr⁻¹|nm)[\])]\s*$")
 _CHANNELS = {"red": "r", "green": "g", "blue": "b"} | {name: name for name in "rgbxyz"}
 _RIVALS = (VALUES, ("wavelength", "channel"), ("phi", "phi_i"), ("phi", "phi_o"), ("sigma",))
 
@@ -113,7 +114,7 @@ def role(name: str, *, any_channel: bool = False) -> Role | None:
         >>> role("BRDF_550nm")
         Role(kind='brdf', channel='550')
     """
-    plain = _UNIT.sub("", name.strip().lower().translate(_GREEK)).strip()
+    plain = _UNIT.sub("", " ".join(name.split()).lower().translate(_GREEK)).strip()
     plain = re.sub(r"[\s\-_]+", "_", plain)
     if plain in _KINDS:
         return Role(_KINDS[plain])
@@ -181,7 +182,7 @@ def _recognised(table: Table, said: Mapping[Role, int]) -> dict[Role, int]:
         if mine is None or mine in said or mine.kind in replaced or column in said.values():
             continue
         if mine in found:
-            both = f"columns {found[mine] + 1} and {column + 1} ({table.names[found[mine]]}, {name})"
+            both = f"columns {found[mine] + 1} and {column + 1} ({table.label(found[mine])}, {table.label(column)})"
             raise ReadError(f"{table.source}: {both} are both {mine}, expected one. {_choose(str(mine))}")
         found[mine] = column
     return found
@@ -253,7 +254,7 @@ def _refuse_unreferenced(table: Table, quantity: str, references: Mapping[str, i
 
 def _found(table: Table) -> str:
     if any(table.names):
-        return f"the columns are {', '.join(filter(None, table.names))}"
+        return f"the columns are {listed(table.names)}"
     return f"no header line and {len(table.names)} columns"
 
 

@@ -6,6 +6,7 @@ It knows no format.
 import codecs
 import os
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 from fitmat.errors import ReadError
@@ -18,9 +19,25 @@ _LEGACY = "cp1252"
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 
 
+def shown(text: str, longest: int = 40) -> str:
+    """Text of the user's as messages show it: in one line, not long, without what a terminal would obey."""
+    begin = " ".join(text[: 8 * longest].split())
+    return _plain(begin[:longest]) + ("…" if len(begin) > longest or len(text) > 8 * longest else "")
+
+
+def listed(names: Iterable[str], most: int = 20) -> str:
+    """Names with commas between, the first ones only where there are many."""
+    every = list(filter(None, names))
+    return ", ".join(shown(name) for name in every[:most]) + (" …" if len(every) > most else "")
+
+
 def name(path: str | os.PathLike[str]) -> str:
     """The file's name as messages show it."""
-    return Path(path).name.encode("utf-8", "replace").decode("utf-8")
+    return _plain(Path(path).name)
+
+
+def _plain(text: str) -> str:
+    return "".join(letter if letter.isprintable() else "�" for letter in text)
 
 
 def size(path: str | os.PathLike[str]) -> int:

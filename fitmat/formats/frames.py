@@ -10,6 +10,7 @@ import numpy as np
 
 from fitmat.errors import ReadError
 from fitmat.formats.columns import VALUES, role
+from fitmat.formats.files import shown
 from fitmat.measurement import default_channels
 
 
@@ -62,7 +63,8 @@ def arrays(source: Labelled) -> dict[str, np.ndarray]:
             if _sizes(variable).keys() <= sizes.keys() and not _stacked(variable)
         }
     except (TypeError, ValueError, AttributeError) as error:
-        raise ReadError(f"{kind}: its variables cannot be read as arrays ({error}). Pass a dict of arrays.") from error
+        got = f"its variables cannot be read as arrays ({shown(str(error), 200)})"
+        raise ReadError(f"{kind}: {got}, expected numbers or texts. Pass a dict of arrays.") from error
     if "channel" in sizes and "channel" not in rows:
         names = np.array(default_channels(sizes["channel"]))
         along = [-1 if dim == "channel" else 1 for dim in sizes]

@@ -95,7 +95,7 @@ def _format(every: blocks.Lines) -> tuple[str, float]:
     if kind != "value":
         expected = "expected bsdf=value: the format does not state the base of its logarithms. Export the values"
         raise ReadError(f"{every.where(1)}: bsdf={blocks.shown(kind)}, {expected}.")
-    if not re.fullmatch(r"\+?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", scale) or not 0 < float(scale) < np.inf:
+    if not re.fullmatch(r"\+?(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?", scale) or not 0 < float(scale) < np.inf:
         raise ReadError(f"{every.where(1)}: scale={blocks.shown(scale)}, expected a positive number. Correct it.")
     return unit, float(scale)
 
@@ -110,9 +110,10 @@ def _directions(
         got = f"{first[row]:g} and {second[row]:g}, expected {'direction cosines' if unit == 'sin' else 'angles'}"
         raise ReadError(f"{lines.where(row)}: {got} (angles={unit}) of at most {limit:.4g}. Is the unit another one?")
     if unit == "sin":
-        return np.stack([first, second, np.sqrt(np.maximum(1.0 - level**2, 0.0))], axis=1)
+        level = np.maximum(level, 1.0)
+        return np.stack([first / level, second / level, np.sqrt(np.maximum(1.0 - (first**2 + second**2), 0.0))], axis=1)
     scale = np.pi / 180 if unit == "deg" else 1.0
-    return from_angles(scale * first, scale * second)
+    return blocks.placed(from_angles(scale * first, scale * second))
 
 
 def _first(bad: np.ndarray) -> Int[np.ndarray, " one"]:

@@ -13,9 +13,7 @@ from jaxtyping import Bool, Int
 
 from fitmat.formats.recording import Recording, mask
 from fitmat.formats.table import Table
-
-_GOLDEN = 0x9E3779B97F4A7C15
-# 2⁶⁴/φ: the multiples of it modulo 2⁶⁴ fill the range evenly, in step with no grid of angles.
+from fitmat.rows import spread
 
 
 class Look:
@@ -140,11 +138,6 @@ def joined_rows(recordings: Sequence[Recording]) -> Recording:
         sigma=None if first.sigma is None else along(lambda r: r.sigma),
         doubts={reason: along(lambda r, key=reason: r.doubts[key]) for reason in first.doubts},
     )
-
-
-def spread(index: Int[np.ndarray, " n"], thinning: int) -> Bool[np.ndarray, " n"]:
-    """One row in `thinning`, by Weyl's sequence: spread evenly, and nested from one thinning to its double."""
-    return index.astype(np.uint64) * np.uint64(_GOLDEN) <= np.uint64((2**64 - 1) // thinning)
 
 
 def magnitudes(recording: Recording, doubts: Mapping[str, np.ndarray]) -> Recording:

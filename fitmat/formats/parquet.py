@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 
 from fitmat.errors import ReadError
-from fitmat.formats import csv, files
+from fitmat.formats import csv, files, footer
 from fitmat.formats.table import Table
 from fitmat.measurement import Measurements
 
@@ -40,11 +40,12 @@ def load(path: str | os.PathLike[str]) -> Table:
         flat = [name for name, kind in schema.items() if kind.is_numeric() or kind in _PLAIN]
         rows = lazy.select(pl.len()).collect().item()
         _refuse_swelling(source, len(raw), 8 * rows * len(flat))
+        _refuse_swelling(source, len(raw), footer.unpacked(raw, flat, rows))
         cells = pl.DataFrame([_plain(column) for column in lazy.select(flat).collect()])
         text = cells.select(pl.col(pl.String).str.len_bytes().sum())
         _refuse_swelling(source, len(raw), sum(text.row(0)) if text.width else 0)
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, ValueError) as error:
-        reason = str(error).partition("\n")[0]
+        reason = files.shown(str(error).partition("\n")[0], 200)
         expected = "expected a whole Parquet file. Was its download cut off?"
         raise ReadError(f"{source}: its Parquet content cannot be read ({reason}), {expected}") from error
     if cells.is_empty():
@@ -52,7 +53,7 @@ def load(path: str | os.PathLike[str]) -> Table:
             f"{source}: no rows of plain cells, expected at least one measured value. Check how it was made."
         )
     left = [name for name in schema if name not in flat]
-    notes = (f"Columns that hold no plain cells, not read: {', '.join(left)}.",) if left else ()
+    notes = (f"Columns that hold no plain cells, not read: {files.listed(left)}.",) if left else ()
     return Table(source, tuple(cells.columns), cells, np.arange(1, cells.height + 1), notes)
 
 

@@ -131,12 +131,22 @@ def measured(recording: Recording, options: Options) -> Measurements:
     """A recording in sr⁻¹ without cosine; what cannot be used is masked (value 0, sigma 1) and counted."""
     valid, masked = mask(recording)
     wi, wo = (np.where(np.isnan(w), UP, w) for w in (recording.wi, recording.wo))
-    scale = factor(recording.quantity, wi, wo, options)
+    try:
+        scale = factor(recording.quantity, wi, wo, options)
+    except ReadError as error:
+        raise ReadError(f"{recording.source}: {error}") from error
+    with np.errstate(over="ignore", invalid="ignore"):
+        value = recording.value * scale
+        sigma = None if recording.sigma is None else recording.sigma * scale
+    extreme = valid & ~(np.isfinite(value) & np.isfinite(0.0 if sigma is None else sigma))
+    if extreme.any():
+        masked |= {"infinite in sr⁻¹": int(extreme.any(axis=1).sum())}
+        valid = valid & ~extreme
     return Measurements(
         wi=wi,
         wo=wo,
-        value=np.where(valid, recording.value * scale, 0.0),
-        sigma=None if recording.sigma is None else np.where(valid, recording.sigma * scale, 1.0),
+        value=np.where(valid, value, 0.0),
+        sigma=None if sigma is None else np.where(valid, sigma, 1.0),
         valid=valid,
         channels=recording.channels,
         source=recording.source,
@@ -177,7 +187,8 @@ def _table(source: Mapping[str, Any] | Frame) -> Table:
     try:
         arrays = {name: np.asarray(source[name]) for name in source.columns}
     except (TypeError, ValueError, LookupError, AttributeError) as error:
-        raise ReadError(f"{kind}: its columns cannot be read as arrays ({error}). Pass a dict of arrays.") from error
+        got = f"its columns cannot be read as arrays ({files.shown(str(error))})"
+        raise ReadError(f"{kind}: {got}, expected one array each. Pass a dict of arrays.") from error
     return from_arrays(arrays, kind)
 
 

@@ -86,7 +86,7 @@ def mask(recording: Recording) -> tuple[Bool[np.ndarray, "n c"], dict[str, int]]
     value, sigma = recording.value, recording.sigma
     lowest = np.minimum(recording.wi[:, 2], recording.wo[:, 2])
     reasons = recording.doubts | {
-        "angle missing or infinite": np.isnan(lowest)[:, None],
+        "angle missing or infinite": np.any(np.isnan(recording.wi + recording.wo), axis=1, keepdims=True),
         "at or below the horizon": (lowest <= HORIZON)[:, None],
         "value missing or NaN": np.isnan(value),
         "value infinite": np.isinf(value),

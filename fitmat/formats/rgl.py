@@ -166,5 +166,5 @@ def _refuse_axis(axis: np.ndarray, limits: tuple[float, float], place: str, unit
     """Nodes that do not increase or are out of range."""
     if not (axis[1:] > axis[:-1]).all():
         raise ReadError(f"{place} does not increase, expected {unit}, in increasing order. Is the file damaged?")
-    if axis[0] < limits[0] - _ROUNDING or axis[-1] > limits[1] + _ROUNDING:
+    if axis[0] < limits[0] or axis[-1] > limits[1] + _ROUNDING:
         raise ReadError(f"{place} runs from {axis[0]:g} to {axis[-1]:g}, expected {unit}. Is the file damaged?")

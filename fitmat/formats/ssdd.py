@@ -35,7 +35,7 @@ LISTS = tuple(f"PARAM{k}_LIST" for k in range(4))
 
 _LIMITS = ((0.0, 90.0), (-360.0, 360.0), (0.0, 180.0), (-360.0, 360.0))
 _ENTRY = re.compile(r"^([A-Z][A-Z0-9_]*)[ \t]+(\S.*)$", re.MULTILINE)
-_DATA = re.compile(rb"^DATA[ \t]+(\w+)[^\n]*\n", re.MULTILINE)
+_DATA = re.compile(rb"^DATA[ \t]+(\w+)\b[^\n]*\n", re.MULTILINE)
 _TYPE = re.compile(rb"^DATA_TYPE[ \t]", re.MULTILINE)
 _FLOAT = np.dtype("<f4")
 

@@ -11,14 +11,13 @@ import polars as pl
 from jaxtyping import Bool, Float, Int
 
 from fitmat.errors import ReadError
+from fitmat.formats.files import listed, shown
 
 MISSING = ("", "nan", "na", "n/a", "<na>", "null", "none", "-")
 """Cells that hold no number and say so, in lower case."""
 
 _TRUTH = {"true": "1", "t": "1", "yes": "1", "y": "1", "false": "0", "f": "0", "no": "0", "n": "0"}
 _PLAIN = {"−": "-", ",": "."}
-_LONGEST = 40
-_LISTED = 20
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -45,7 +44,7 @@ class Table:
 
     def label(self, column: int) -> str:
         """A column's name, or its number where it has none."""
-        return self.names[column] or f"column {column + 1}"
+        return shown(self.names[column]) or f"column {column + 1}"
 
     def numbers(self, column: int) -> Float[np.ndarray, " n"]:
         """The column as float64, NaN where a cell is empty.
@@ -74,18 +73,18 @@ class Table:
         Raises:
             ReadError: no such column, or no such row; what there is is listed.
         """
-        name, _, value = (part.strip() for part in where.partition("="))
+        name, given, value = (part.strip() for part in where.partition("="))
+        if not given:
+            raise ReadError(f"{self.source}: where = {where!r} (--where), expected NAME=VALUE. Write material=Alu.")
         if name not in self.names:
-            listed = ", ".join(filter(None, self.names)) or "none has a name"
-            raise ReadError(f"{self.source}: where = {where!r} (--where), expected a column of {listed}. Correct it.")
+            there = listed(self.names) or "none has a name"
+            raise ReadError(f"{self.source}: where = {where!r} (--where), expected a column of {there}. Correct it.")
         words = self.words(self.names.index(name))
         rows = np.flatnonzero(words == value)
         if not len(rows):
             found = list(dict.fromkeys(words.tolist()))
-            listed = ", ".join(found[:_LISTED]) + (" …" if len(found) > _LISTED else "")
-            raise ReadError(
-                f"{self.source}: {name} is never {value!r}, expected one of {listed}. Choose one (--where)."
-            )
+            expected = f"expected one of {listed(found)}. Choose one (--where)"
+            raise ReadError(f"{self.source}: {shown(name)} is never {value!r}, {expected}.")
         noted = (*self.notes, f"Only rows with {name} = {value}: {len(rows)} of {len(words)}.")
         return dataclasses.replace(self, cells=self.cells[rows], lines=self.lines[rows], notes=noted)
 
@@ -96,7 +95,7 @@ class Table:
             ReadError: any of `bad` is true.
         """
         for row in np.flatnonzero(bad)[:1]:
-            cell = str(self.cells.to_series(column)[int(row)])[:_LONGEST] or "(empty)"
+            cell = shown(str(self.cells.to_series(column)[int(row)])) or "(empty)"
             raise ReadError(f"{self.where(row)}: {self.label(column)} = {cell}, expected {expected}")
 
     def _lower(self, column: int) -> pl.Series:
@@ -120,8 +119,8 @@ def from_arrays(arrays: Mapping[str, np.ndarray], source: str) -> Table:
     columns = {str(name): _series(str(name), array, source) for name, array in arrays.items()}
     lengths = {name: len(column) for name, column in columns.items()}
     if len(set(lengths.values())) > 1:
-        listed = ", ".join(f"{name}: {length}" for name, length in lengths.items())
-        raise ReadError(f"{source}: columns of unlike length ({listed}), expected one length. Give one value per row.")
+        got = listed(f"{shown(name)}: {length}" for name, length in lengths.items())
+        raise ReadError(f"{source}: columns of unlike length ({got}), expected one length. Give one value per row.")
     if not sum(lengths.values()):
         raise ReadError(f"{source}: no rows, expected at least one measured value. Check how it was made.")
     cells = pl.DataFrame(list(columns.values()))
@@ -133,9 +132,15 @@ def _series(name: str, array: np.ndarray, source: str) -> pl.Series:
         column = np.ma.asarray(array)
         numeric = column.dtype.kind in "biuf"
         filled = np.ma.filled(column.astype(float), np.nan) if numeric else np.ma.filled(column.astype(str), "")
-    except ValueError as error:
-        raise ReadError(f"{source}: column {name} is not an array ({error}). Give one value per row.") from error
+    except (TypeError, ValueError) as error:
+        got = f"column {shown(name)} is not an array ({shown(str(error), 200)})"
+        raise ReadError(f"{source}: {got}, expected (n,) numbers or texts. Give one value per row.") from error
     if filled.ndim != 1:
         expected = "expected (n,). Give one value per row, and each name once."
-        raise ReadError(f"{source}: column {name} has shape {filled.shape}, {expected}")
-    return pl.Series(name, filled)
+        raise ReadError(f"{source}: column {shown(name)} has shape {filled.shape}, {expected}")
+    return pl.Series(name.encode("utf-8", "replace").decode(), filled if numeric else _sound(filled))
+
+
+def _sound(text: np.ndarray) -> list[str]:
+    """Text without the halves of characters that UTF-8 cannot hold."""
+    return [cell.encode("utf-8", "replace").decode() for cell in text.tolist()]

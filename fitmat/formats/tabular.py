@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from fitmat.formats import files
 from fitmat.formats.angles import directions
 from fitmat.formats.columns import assign
 from fitmat.formats.options import Options
@@ -39,7 +40,7 @@ def recording(table: Table, columns: str | Mapping[str, str | int] | None, optio
         spread = _stacked(table, layout.reference_sigmas) if layout.reference_sigmas else None
         doubts["reference reading not positive"] = ~(reference > 0)
         value, sigma = _ratio((value, sigma), (np.where(reference > 0, reference, np.nan), spread))
-    unused = (f"Columns not used: {', '.join(layout.unused)}.",) if layout.unused else ()
+    unused = (f"Columns not used: {files.listed(layout.unused)}.",) if layout.unused else ()
     found = Recording(
         source=table.source,
         wi=from_angles(theta_i, phi_i),
@@ -64,10 +65,11 @@ def _ratio(
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """y/r and its σ, √(σ_y² + (y/r σ_r)²)/r (JCGM 100:2008, eq. 10); a σ that is not given counts as 0."""
     (y, sigma_y), (r, sigma_r) = signal, reference
-    if sigma_y is None and sigma_r is None:
-        return y / r, None
-    apart, shared = (np.zeros_like(y) if sigma is None else sigma for sigma in (sigma_y, sigma_r))
-    return y / r, np.hypot(apart, y / r * shared) / r
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is masked
+        if sigma_y is None and sigma_r is None:
+            return y / r, None
+        apart, shared = (np.zeros_like(y) if sigma is None else sigma for sigma in (sigma_y, sigma_r))
+        return y / r, np.hypot(apart, y / r * shared) / r
 
 
 def _flagged(table: Table, marks: Mapping[str, int]) -> np.ndarray:

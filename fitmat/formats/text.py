@@ -12,12 +12,15 @@ from fitmat.errors import ReadError
 from fitmat.formats import files
 from fitmat.formats.table import MISSING, Table
 
+WIDEST = 4096
+"""A table of more columns is refused; those of spectrometers have up to 2,000 channels."""
+
 _SPACED = re.compile(r"\d\s+[-+.]?\d")
 _COMMENT = r"^\s*(#|%|//)"
 _SEMICOLON = r"^\s*;"
 _BLANK = r"^[\s,;]*$"
 _QUOTED = r'"[^"]*"'
-_NUMBER = re.compile(r"[-+−]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|[-+]?(?i:inf|infinity)")
+_NUMBER = re.compile(r"[-+−]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?|[-+]?(?i:inf|infinity)")
 _SAMPLE = 20
 _DECIMAL_COMMA = r"^[-+−]?\d*,\d+([eE][-+]?\d+)?$"
 _DECIMAL_POINT = r"^[-+−]?\d*\.\d+([eE][-+]?\d+)?$"
@@ -31,11 +34,12 @@ def load(path: str | os.PathLike[str]) -> Table:
     """
     source = files.name(path)
     text, notes = files.decoded(files.contents(path), source)
-    return _parse(text, source, notes)
+    return parse(text, source, notes)
 
 
-def _parse(text: str, source: str, notes: tuple[str, ...]) -> Table:
-    lines = pl.DataFrame({"text": re.split(r"\r\n|\r|\n", text)}).with_row_index("line", offset=1)
+def parse(text: str, source: str, notes: tuple[str, ...], above: int = 0) -> Table:
+    """The table in a text whose first line is line `above` + 1 of its file."""
+    lines = pl.DataFrame({"text": re.split(r"\r\n|\r|\n", text)}).with_row_index("line", offset=1 + above)
     lines = lines.filter(~pl.col("text").str.contains(_BLANK))
     comment = lines["text"].str.contains(_COMMENT)
     delimiter = _delimiter(lines.filter(~comment)["text"].head(_SAMPLE).to_list())
@@ -56,7 +60,7 @@ def _parse(text: str, source: str, notes: tuple[str, ...]) -> Table:
         rows, cells = rows.slice(1), cells.slice(1)
     if cells.is_empty():
         expected = "expected rows of numbers below it. Is the file complete?"
-        raise ReadError(f"{source}: a header and no rows ({', '.join(names)}), {expected}")
+        raise ReadError(f"{source}: a header and no rows ({files.listed(names)}), {expected}")
     table = Table(source, names, cells, rows["line"].to_numpy(), notes)
     _refuse_mixed_decimals(table)
     return table
@@ -87,6 +91,9 @@ def _refuse_ragged(rows: pl.DataFrame, delimiter: str, source: str) -> None:
     for row in (text.str.contains('"', literal=True)).arg_true()[:1]:
         got = 'a quote (") without its end, expected pairs'
         raise ReadError(f"{source} row {rows['line'][row]}: {got}. Remove it.")
+    if counts[0] > WIDEST:
+        expected = f"expected at most {WIDEST}, one for each angle and channel. Is it a table?"
+        raise ReadError(f"{source} row {rows['line'][0]}: {counts[0]} cells, {expected}")
     for row in (counts != counts[0]).arg_true()[:1]:
         got = f"{counts[row]} cells, expected {counts[0]} as in row {rows['line'][0]}"
         raise ReadError(f"{source} row {rows['line'][row]}: {got}. Correct the line, or put # before it.")
@@ -97,7 +104,7 @@ def _cells(rows: pl.DataFrame, delimiter: str, source: str) -> pl.DataFrame:
     try:
         cells = pl.read_csv(content, separator=delimiter, has_header=False, infer_schema=False)
     except pl.exceptions.PolarsError as error:
-        reason = str(error).splitlines()[0]
+        reason = files.shown(str(error), 200)
         got = f"not a table ({reason}), expected plain cells"
         raise ReadError(f"{source}: {got}. Remove the quotes.") from error
     return cells.select(pl.all().fill_null("").str.strip_chars())

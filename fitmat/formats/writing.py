@@ -54,5 +54,6 @@ def _room(target: Path) -> Any:
     suffix = target.suffix.lower()
     if suffix not in FORMATS:
         known = ", ".join(FORMATS)
-        raise OutputError(f"{target}: no format is named {suffix or 'by no suffix'}, expected {known}. Rename it.")
+        got = f"no format has the suffix {suffix}" if suffix else "the name has no suffix, which says the format"
+        raise OutputError(f"{target}: {got}, expected {known}. Rename it.")
     return importlib.import_module(f"fitmat.formats.{FORMATS[suffix]}")

@@ -1,0 +1,250 @@
+"""Bulk: the fit of a file too large for memory, by passes over its chunks.
+
+It ends where `fitting.fit` of all rows at once would end, and it keeps no rows but a part of them for the pictures. It
+looks for no other optimum than the one that the part shows.
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import NamedTuple, TypeVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import ArrayLike, Float
+
+from fitmat import fitting
+from fitmat.brdf import AbstractBRDF
+from fitmat.information import FOLLOWS, covariance, expected_information, observed_information
+from fitmat.likelihood import NEGLIGIBLE, Data, noise_scale
+from fitmat.outcome import Fit, named_outcome
+from fitmat.params import space, vector, with_vector
+from fitmat.rows import Progress, Rows
+from fitmat.scatter import Scatter, scatter
+from fitmat.sums import Sums, block_sums, blocks, prior_sums
+
+T = TypeVar("T")
+
+PASSES = 20
+"""At most this many passes over the file; three or four are usual."""
+
+SETTLED = 1e-5
+"""A Newton step of this many standard errors is the last one."""
+
+NEAR = 0.1
+"""Standard errors from which on a Newton step tells where a small discrepancy ends."""
+
+DAMPING = 1e-2
+"""The first damping after a step that made things worse, relative to the diagonal of the curvature."""
+
+ROUNDING = 1e-13
+"""Relative error of a sum over all rows: a cost that rose by less did not rise."""
+
+NO_CURVATURE = 1e-11
+"""Eigenvalue of the scaled curvature below which a direction is left where it is: rounding, not data, moves it."""
+
+
+def fit_chunks(
+    chunks: Rows,
+    to: str | AbstractBRDF,
+    *,
+    fixed: Mapping[str, ArrayLike] | None = None,
+    masking: str | None = None,
+    progress: Progress | None = None,
+) -> Fit:
+    """Fit a model to a large file.
+
+    The part of the file is fitted first. From there, Newton's method moves the free parameters and the discrepancy
+    together to the maximum of the likelihood of all rows; bounds are kept by projection (Bertsekas 1982, eq. 32).
+
+    Args:
+        chunks: A file, from `fitmat.formats.chunks.scan`, or measurements in memory, from `fitmat.rows.held`.
+        to: A model name ("lambert+ggx"), or a model whose shapes and static choices are used.
+        fixed: Parameters to hold, by name: `{"ks": 1.0}`.
+        masking: Static masking choice for the microfacet lobes of a named model.
+        progress: Called after each chunk of each pass.
+
+    Returns:
+        A `Fit` whose numbers are those of all rows; its `measurements`, `noise` and `data` are the part.
+
+    Raises:
+        FitmatError: as `fitting.fit`, and ReadError where the file changed since `scan`.
+    """
+    known = scatter(chunks, progress)
+    part_noise = known.of_part(chunks.part)
+    start = fitting.fit(dataclasses.replace(chunks.part, sigma=part_noise.sigma), to, fixed=fixed, masking=masking)
+    start = dataclasses.replace(start, measurements=chunks.part, noise=part_noise)
+    if not start.finite:
+        return start
+    file, around = _File(chunks, known, start, progress), _Range(start)
+    return _concluded(file, around, _climb(file, around))
+
+
+class _File(NamedTuple):
+    """What a pass needs: the chunks, their noise, the fit of the part, and whom to tell."""
+
+    chunks: Rows
+    known: Scatter
+    start: Fit
+    progress: Progress | None
+
+    def added(self, of: Callable[[Data], T], what: str) -> T:
+        """The sum of `of` over all rows, block by block."""
+        total, done = None, 0
+        for chunk in self.chunks:
+            for data in blocks(chunk, self.known.of(chunk)):
+                found = of(data)
+                total = found if total is None else jax.tree.map(np.add, total, found)
+            done += chunk.n_samples
+            if self.progress is not None:
+                self.progress(what, done, self.chunks.n_samples)
+        assert total is not None
+        return total
+
+    def sums(self, best: AbstractBRDF, s: float, what: str) -> Sums:
+        """The sums of all rows and of the prior."""
+        rows = self.added(lambda data: jax.device_get(block_sums(best, data, jnp.asarray(s))), what)
+        return jax.tree.map(np.add, rows, jax.device_get(prior_sums(best, self.start.data)))
+
+
+class _Range:
+    """Where the free natural coordinates and, behind them, s may go; x is such a vector, (free + 1,).
+
+    Attributes:
+        lower: Lower bounds; 0 for s.
+        upper: Upper bounds; infinite for s.
+        longest: How far one step may go.
+        negligible: The s below which there is none.
+    """
+
+    def __init__(self, start: Fit) -> None:
+        self._start, self._space, self._free = start, space(start.model), start.free
+        lower, upper = self._space.natural_lower[self._free], self._space.natural_upper[self._free]
+        typical = float(noise_scale(start.data))
+        self.lower, self.upper = np.append(lower, 0.0), np.append(upper, np.inf)
+        self.longest = np.append((upper - lower) / 4.0, max(typical, start.discrepancy))
+        self.negligible = NEGLIGIBLE * typical
+
+    @property
+    def begin(self) -> np.ndarray:
+        """The optimum of the part; what is almost on a bound, on it."""
+        side = self._space.at_bound(self._start.values)[self._free]
+        natural = self._space.natural_array(self._start.values)[self._free]
+        natural = np.where(side < 0, self.lower[:-1], np.where(side > 0, self.upper[:-1], natural))
+        return np.append(natural, self._start.discrepancy)
+
+    def model(self, x: np.ndarray) -> AbstractBRDF:
+        """The model at x."""
+        values = self._start.values.copy()
+        log, bounds = self._space.log[self._free], (self._space.lower[self._free], self._space.upper[self._free])
+        values[self._free] = np.clip(np.where(log, np.exp(np.where(log, x[:-1], 0.0)), x[:-1]), *bounds)
+        return with_vector(self._start.model, jnp.asarray(values))
+
+    def second_order(self, n_valid: int) -> Float[np.ndarray, "p p"]:
+        """What residuals × their curvature add to JᵀJ of so many values, estimated from the part; 0 if negligible."""
+        start = self._start
+        first = np.asarray(expected_information(start.model, start.data, jnp.asarray(start.discrepancy)))
+        return (start.information - first) * n_valid / start.measurements.n_valid
+
+    def step(self, x: np.ndarray, sums: Sums, more: np.ndarray, damping: float) -> tuple[np.ndarray, float]:
+        """The projected Newton step from x, and its length in standard errors."""
+        free, size = self._free, len(self._free)
+        slope, curvature = np.append(sums.gradient[free], sums.slope), np.zeros((size + 1, size + 1))
+        curvature[:size, :size] = (sums.gram + more)[np.ix_(free, free)]
+        curvature[size, :size] = curvature[:size, size] = sums.mixed[free]
+        curvature[size, size] = sums.curvature
+        held = ((x <= self.lower) & (slope > 0)) | ((x >= self.upper) & (slope < 0))
+        while True:
+            moving, step = np.flatnonzero(~held), np.zeros(size + 1)
+            step[moving], length = _newton(slope[moving], curvature[np.ix_(moving, moving)], damping)
+            leaving = ~held & (((x <= self.lower) & (step < 0)) | ((x >= self.upper) & (step > 0)))
+            if not leaving.any():
+                break
+            held |= leaving
+        step *= min(1.0, float(np.min(self.longest / np.maximum(np.abs(step), 1e-300))))
+        return np.clip(x + step, self.lower, self.upper) - x, length
+
+
+def _newton(slope: np.ndarray, curvature: np.ndarray, damping: float) -> tuple[np.ndarray, float]:
+    """−H⁻¹g, downhill also where H is not positive definite, and the length of that step without damping.
+
+    Along directions of no curvature it is 0.
+    """
+    diagonal = np.abs(np.diagonal(curvature))
+    unit = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+    eigenvalues, vectors = np.linalg.eigh(curvature / np.outer(unit, unit))
+    sharp = np.abs(eigenvalues) > NO_CURVATURE
+    along = np.where(sharp, vectors.T @ (slope / unit), 0.0)
+    size = np.where(sharp, np.abs(eigenvalues), 1.0)
+    return -vectors @ (along / (size + damping)) / unit, float(np.sqrt(np.sum(along**2 / size)))
+
+
+class _Top(NamedTuple):
+    """Where the passes ended: x, the sums there, how many passes, and whether more would change nothing."""
+
+    x: np.ndarray
+    sums: Sums
+    passes: int
+    settled: bool
+
+
+def _climb(file: _File, around: _Range) -> _Top:
+    """Newton's method with damping after steps that made things worse (Levenberg 1944)."""
+    x, damping = around.begin, 0.0
+    kept = file.sums(around.model(x), x[-1], "pass 1")
+    more = around.second_order(file.chunks.n_valid)
+    for k in range(2, PASSES + 1):
+        step, length = around.step(x, kept, more, damping)
+        tried = x + step
+        negligible = length < NEAR and 0.0 < tried[-1] < around.negligible
+        if length < SETTLED and not negligible:
+            return _Top(tried, kept, k - 1, True)
+        if negligible:
+            around.upper[-1] = tried[-1] = 0.0
+        sums = file.sums(around.model(tried), tried[-1], f"pass {k}")
+        better = negligible or sums.cost <= kept.cost + ROUNDING * abs(kept.cost)
+        damping = (damping / 3.0 if damping > DAMPING else 0.0) if better else max(10.0 * damping, DAMPING)
+        if better:
+            x, kept = tried, sums
+    return _Top(x, kept, PASSES, False)
+
+
+def _concluded(file: _File, around: _Range, top: _Top) -> Fit:
+    """The fit of the part with the numbers of all rows."""
+    start, best, s = file.start, around.model(top.x), float(top.x[-1])
+    information, free = np.asarray(top.sums.gram), start.free
+    if s >= FOLLOWS * float(noise_scale(start.data)):
+        at = jnp.asarray(s)
+        observed = file.added(lambda data: np.asarray(observed_information(best, data, at)), "curvature")
+        observed = observed + np.asarray(prior_sums(best, start.data).gram)
+        information = observed if _positive(observed[np.ix_(free, free)]) else information
+    prior = start.data.prior
+    told = np.zeros(len(free), bool) if prior is None else np.asarray(prior.precision)[free] > 0
+    spread, undetermined = covariance(best, information, free, told)
+    values = np.asarray(vector(best))
+    on_bound = bool(space(best).at_bound(values)[free].any())
+    return dataclasses.replace(
+        start,
+        model=best,
+        discrepancy=s,
+        result=named_outcome(bool(np.isfinite(top.sums.cost)), top.settled, on_bound, undetermined),
+        steps=start.steps + top.passes,
+        log_likelihood=-float(top.sums.cost),
+        information=information,
+        covariance=spread,
+        undetermined=undetermined,
+        n_values=file.chunks.n_valid,
+        discrepancy_sd=_discrepancy_sd(top.sums),
+    )
+
+
+def _discrepancy_sd(sums: Sums) -> float:
+    """Half of how far s must rise for the log-likelihood to fall by 2, as `uncertainty` has it, from its parabola."""
+    slope, curvature = max(float(sums.slope), 0.0), max(float(sums.curvature), 1e-300)
+    return float((np.sqrt(slope**2 + 4.0 * curvature) - slope) / (2.0 * curvature))
+
+
+def _positive(information: np.ndarray) -> bool:
+    scale = np.sqrt(np.abs(np.diagonal(information)) + 1e-300)
+    eigenvalues = np.linalg.eigvalsh(information / np.outer(scale, scale))
+    return bool(np.isfinite(information).all() and eigenvalues.min(initial=1.0) > 1e-9)

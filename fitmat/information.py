@@ -1,0 +1,104 @@
+"""Information: how sharply the data determine the parameters near an optimum, and the covariance that follows.
+
+It finds no optimum and names no outcome.
+"""
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from fitmat.brdf import AbstractBRDF
+from fitmat.likelihood import Data, every_residual, noise_scale
+from fitmat.params import entries, space, vector, with_vector
+
+UNDETERMINED = {"log": 1.0, "linear": 0.3}
+"""A parameter whose standard deviation exceeds this (in ln p, or as a fraction of its range) is not determined."""
+
+FOLLOWS, MISSES = 0.5, 2.0
+"""Ratios of discrepancy to noise up to which a model follows the data, and from which it is inadequate."""
+
+
+def _cost_terms(best: AbstractBRDF, data: Data, s: Array) -> tuple[Callable[[Array], Array], Array]:
+    """The residuals as a function of the natural coordinates, and those of `best`."""
+    coordinates = space(best)
+    at = coordinates.natural(vector(best))
+    return lambda t: every_residual(with_vector(best, coordinates.physical(t)), data, s), at
+
+
+@eqx.filter_jit
+def expected_information(best: AbstractBRDF, data: Data, s: Array) -> Array:
+    """JᵀJ in natural coordinates, (p, p)."""
+    residual, at = _cost_terms(best, data, s)
+    jacobian = jax.jacfwd(residual)(at)
+    return jacobian.T @ jacobian
+
+
+@eqx.filter_jit
+def observed_information(best: AbstractBRDF, data: Data, s: Array) -> Array:
+    """The Hessian of ½Σ residual² in natural coordinates, (p, p); compiles three times as long as JᵀJ."""
+    residual, at = _cost_terms(best, data, s)
+    return jax.jacfwd(jax.jacfwd(lambda t: 0.5 * jnp.sum(residual(t) ** 2)))(at)
+
+
+def information(best: AbstractBRDF, data: Data, s: float, free: np.ndarray) -> Float[np.ndarray, "p p"]:
+    """The expected information where the model follows the data, else the observed one if it is positive definite.
+
+    For a model that is right they differ by chance only. For one that is not, the residuals are large and their
+    curvature counts: it may determine what the Jacobian alone does not (Efron & Hinkley 1978).
+    """
+    expected = np.asarray(expected_information(best, data, jnp.asarray(s)))
+    if s < FOLLOWS * float(noise_scale(data)):
+        return expected
+    observed = np.asarray(observed_information(best, data, jnp.asarray(s)))
+    part = observed[np.ix_(free, free)]
+    scale = np.sqrt(np.abs(np.diagonal(part)) + 1e-300)
+    positive = np.isfinite(part).all() and np.linalg.eigvalsh(part / np.outer(scale, scale)).min(initial=1.0) > 1e-9
+    return observed if positive else expected
+
+
+def inverse_information(information: np.ndarray, span: np.ndarray) -> np.ndarray:
+    """The inverse of an information matrix, huge but finite along directions that the data do not determine.
+
+    Args:
+        information: In natural coordinates, (k, k).
+        span: Widths of the bounds in the same coordinates, (k,); they set the scale of "huge".
+    """
+    scaled = np.nan_to_num(information * np.outer(span, span))
+    unit = np.sqrt(np.maximum(np.diagonal(scaled), 1e-12))
+    eigenvalues, vectors = np.linalg.eigh(scaled / np.outer(unit, unit))
+    size = span / unit
+    return (vectors / np.maximum(eigenvalues, 1e-14)) @ vectors.T * np.outer(size, size)
+
+
+def covariance(
+    best: AbstractBRDF, information: np.ndarray, free: np.ndarray, told: np.ndarray
+) -> tuple[Float[np.ndarray, "p p"], tuple[str, ...]]:
+    """The covariance in physical parameters, and what is not determined.
+
+    What is determined is judged with every free parameter released, those on a bound as well: a fit that slid along a
+    degenerate direction until it met a bound knows no more for that. Only where all are determined are the parameters
+    on a bound held there. Parameters of which a prior tells (`told`, as `free`) count as known in the judgement.
+    """
+    coordinates, values = space(best), np.asarray(vector(best))
+    span = coordinates.natural_upper - coordinates.natural_lower
+    released = inverse_information(information[np.ix_(free, free)], span[free])
+    limit = np.where(coordinates.log, UNDETERMINED["log"], UNDETERMINED["linear"] * span)
+    judged = free[~told]
+    apart = released if not told.any() else inverse_information(information[np.ix_(judged, judged)], span[judged])
+    loose = set(judged[~(np.sqrt(np.diagonal(apart)) <= limit[judged])])
+    on_bound = (coordinates.at_bound(values) != 0) & np.isin(np.arange(len(values)), free)
+    inside = free[~on_bound[free]]
+    if loose:
+        natural = released[np.ix_(~on_bound[free], ~on_bound[free])]
+    else:
+        natural = inverse_information(information[np.ix_(inside, inside)], span[inside])
+    slope = np.where(coordinates.log, values, 1.0)[inside]
+    covariance = np.zeros((len(values), len(values)))
+    covariance[np.ix_(inside, inside)] = natural * np.outer(slope, slope)
+    covariance[on_bound, :] = covariance[:, on_bound] = np.nan
+    names = tuple(e.name for e in entries(best) if loose & set(range(e.place.start, e.place.stop)))
+    return covariance, names

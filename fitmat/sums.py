@@ -1,0 +1,87 @@
+"""Sums: the cost of some rows and its derivatives, which add up over the blocks of a file.
+
+It takes no step and reads no file.
+"""
+
+import dataclasses
+from collections.abc import Iterator
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from fitmat.brdf import AbstractBRDF
+from fitmat.likelihood import Data, log_likelihood, prepare, prior_residuals, residuals
+from fitmat.measurement import Measurements
+from fitmat.noise import Noise
+from fitmat.params import space, vector, with_vector
+
+BLOCK = 2**15
+"""Rows for which the program that adds up one block is compiled; its intermediate arrays stay in the cache."""
+
+
+class Sums(eqx.Module):
+    """The cost −ln L of some rows and its derivatives; t are the natural coordinates of all p parameters.
+
+    Attributes:
+        cost: −ln L.
+        gradient: ∂cost/∂t, (p,).
+        gram: JᵀJ of the residuals, (p, p).
+        slope: ∂cost/∂s.
+        mixed: ∂²cost/∂t∂s, (p,).
+        curvature: ∂²cost/∂s².
+    """
+
+    cost: Float[Array, ""]
+    gradient: Float[Array, " p"]
+    gram: Float[Array, "p p"]
+    slope: Float[Array, ""]
+    mixed: Float[Array, " p"]
+    curvature: Float[Array, ""]
+
+
+@eqx.filter_jit
+def block_sums(best: AbstractBRDF, data: Data, s: Array) -> Sums:
+    """The sums of one block at `best` and s."""
+    coordinates = space(best)
+    at = coordinates.natural(vector(best))
+
+    def by_parameter(s: Array) -> tuple[Array, Array]:
+        def residual(t: Array) -> Array:
+            return residuals(with_vector(best, coordinates.physical(t)), data, s).ravel()
+
+        r, columns = jax.vmap(lambda e: jax.jvp(residual, (at,), (e,)), out_axes=(None, 0))(jnp.eye(len(at)))
+        return columns @ r, columns @ columns.T
+
+    def slope(s: Array) -> tuple[Array, Array]:
+        cost, change = jax.value_and_grad(lambda s: -log_likelihood(best, data, s))(s)
+        return change, cost
+
+    (gradient, gram), (mixed, _) = jax.jvp(by_parameter, (s,), (jnp.ones_like(s),))
+    (change, cost), (curvature, _) = jax.jvp(slope, (s,), (jnp.ones_like(s),))
+    return Sums(cost, gradient, gram, change, mixed, curvature)
+
+
+def prior_sums(best: AbstractBRDF, data: Data) -> Sums:
+    """The sums of what is known beforehand; all 0 where the prior is flat."""
+    coordinates = space(best)
+    at, none = coordinates.natural(vector(best)), jnp.zeros(())
+
+    def apart(t: Array) -> Array:
+        return prior_residuals(with_vector(best, coordinates.physical(t)), data)
+
+    r, jacobian = apart(at), jax.jacfwd(apart)(at)
+    return Sums(0.5 * jnp.vdot(r, r), jacobian.T @ r, jacobian.T @ jacobian, none, 0.0 * at, none)
+
+
+def blocks(chunk: Measurements, noise: Noise) -> Iterator[Data]:
+    """A chunk as the likelihood sees it, in blocks of `BLOCK` rows, the last one filled with rows of weight 0."""
+    for first in range(0, chunk.n_samples, BLOCK):
+        rows = np.arange(first, min(first + BLOCK, chunk.n_samples))
+        data = prepare(chunk.rows(rows), dataclasses.replace(noise, sigma=noise.sigma[rows]))
+        extra = ((0, BLOCK - len(data.x)), (0, 0))
+        parts = (data.wi, data.wo, data.x, data.noise, data.kappa)
+        filled = [jnp.asarray(np.pad(np.asarray(part), extra, mode="edge")) for part in parts]
+        yield Data(*filled, weight=jnp.asarray(np.pad(np.asarray(data.weight), extra)))
