@@ -40,6 +40,8 @@ FORMATS: tuple[Any, ...] = (rgl, merl, zemax, lighttools, fred, astm, alta, ssdd
 """Rooms of one format each, asked in this order: `claims(head, size)` says whether a file is theirs, `load(path)` makes
 the `Recording`; what none claims is a text table."""
 
+EXCHANGED = "theta_i=phi_i,phi_i=theta_i,theta_o=phi_o,phi_o=theta_o"
+
 UP = np.array([0.0, 0.0, 1.0])
 
 _DIGITS = 9
@@ -120,6 +122,8 @@ def read(
     if not found.valid.any():
         listed = ", ".join(f"{count} {reason}" for reason, count in found.masked.items())
         expected = "expected at least one value that can be used. Check the columns and units"
+        if found.masked.get("at or below the horizon") == found.n_samples:
+            expected += f'; where phi is the zenith angle, pass columns="{EXCHANGED}" (--columns)'
         raise ReadError(f"{recording.source}: every row is masked ({listed}), {expected}.")
     found = dataclasses.replace(
         found, notes=(*found.notes, *_oddities(found, recording.distinct)), instrument=instrument
