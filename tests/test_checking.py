@@ -240,7 +240,7 @@ def test_wrong_input_ends_in_one_line(run: Run, sparse: Path, arguments: tuple[o
 def test_numbers_out_of_range_are_wrong_usage(run: Run, sparse: Path, flag: tuple[str, object]) -> None:
     ended = run("check", "sparse.csv", *flag)
     assert ended.code == 2
-    assert "is not in the range" in " ".join(ended.err.replace("│", "").split())
+    assert flag[0] in ended.err
 
 
 @pytest.mark.parametrize("command", ["check", "convert"])

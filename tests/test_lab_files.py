@@ -57,7 +57,7 @@ def test_two_formats_of_one_sample_give_the_same_parameters(black_anodise) -> No
     near = distance < SHARED
     fits = [
         fm.fit(m, "lambert+ggx")
-        for m in (zemax.rows(np.unique(usable[partner[near]])), fred.rows(np.flatnonzero(near)))
+        for m in (zemax.rows(np.unique(usable[np.asarray(partner)[near]])), fred.rows(np.flatnonzero(near)))
     ]
     spread = np.sqrt(np.diagonal(fits[0].covariance) + np.diagonal(fits[1].covariance))
     assert near.sum() > 100
