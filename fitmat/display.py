@@ -6,6 +6,9 @@ Knows no result.
 import math
 from collections.abc import Sequence
 from html import escape
+from typing import Any
+
+import numpy as np
 
 LARGE = 1e6
 """Numbers from here on are written with a power of ten."""
@@ -46,3 +49,14 @@ def text_table(caption: str, rows: Sequence[Sequence[str]]) -> str:
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     return "\n".join([caption, *lines])
+
+
+def plain(thing: Any) -> Any:
+    """JSON types only: arrays to lists, NaN and infinity to None."""
+    if isinstance(thing, dict):
+        return {key: plain(value) for key, value in thing.items()}
+    if isinstance(thing, list | tuple):
+        return [plain(value) for value in thing]
+    if isinstance(thing, np.ndarray | np.generic):
+        return plain(thing.tolist())
+    return None if isinstance(thing, float) and not math.isfinite(thing) else thing

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 
 from fitmat import plots
 from fitmat.comparison import CLOSE, SIMILAR, Comparison, Estimate
-from fitmat.display import interval, with_error
+from fitmat.display import interval, plain, with_error
 from fitmat.measurement import Measurements
 from fitmat.metrics import fit_metrics
 from fitmat.outcome import RESULTS
@@ -45,7 +45,7 @@ def write(folder: Path, posteriors: Sequence[Posterior], match: Comparison | Non
 def to_dict(posteriors: Sequence[Posterior], match: Comparison | None) -> dict[str, Any]:
     """What the report holds, as JSON types; numbers that are not finite become null."""
     m = posteriors[0].fit.measurements
-    return _plain(
+    return plain(
         {
             "fitmat": version("fitmat"),
             "file": m.source,
@@ -115,17 +115,6 @@ def _match_dict(match: Comparison) -> dict[str, Any]:
         "delta_bic": match.delta_bic,
         "verdict": match.verdict,
     }
-
-
-def _plain(thing: Any) -> Any:
-    """JSON types only: arrays to lists, NaN and infinity to None."""
-    if isinstance(thing, dict):
-        return {key: _plain(value) for key, value in thing.items()}
-    if isinstance(thing, list | tuple):
-        return [_plain(value) for value in thing]
-    if isinstance(thing, np.ndarray | np.generic):
-        return _plain(thing.tolist())
-    return None if isinstance(thing, float) and not math.isfinite(thing) else thing
 
 
 def rows(posterior: Posterior) -> list[dict[str, str]]:

@@ -5,12 +5,12 @@ It fits no model, repairs nothing and draws nothing.
 
 import dataclasses
 import html
-import math
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
+from fitmat.display import plain
 from fitmat.examination import finding_words, words
 from fitmat.examination.consistency import Agreement, Consistency, consistency
 from fitmat.examination.coverage import Coverage, coverage, mirror_frame
@@ -117,7 +117,7 @@ class Examination:
             else {"angle_deg": np.rad2deg(self.tilt.angle), "sd_deg": np.rad2deg(self.tilt.error)},
             "prospects": [dataclasses.asdict(p) for p in self.prospects],
         }
-        return _plain(found)
+        return plain(found)
 
     def _channel(self, k: int) -> dict[str, Any]:
         """What is known of one channel."""
@@ -229,14 +229,3 @@ def _degrees(thing: Peak | Level) -> dict[str, Any]:
     found = {k: v for k, v in dataclasses.asdict(thing).items() if k != "channel"}
     return {f"{k}_deg" if k in angles else k: v if k not in angles or v is None else np.rad2deg(v)
             for k, v in found.items()}  # fmt: skip
-
-
-def _plain(thing: Any) -> Any:
-    """JSON types only: arrays to lists, NaN and infinity to None."""
-    if isinstance(thing, dict):
-        return {key: _plain(value) for key, value in thing.items()}
-    if isinstance(thing, list | tuple):
-        return [_plain(value) for value in thing]
-    if isinstance(thing, np.ndarray | np.generic):
-        return _plain(thing.tolist())
-    return None if isinstance(thing, float) and not math.isfinite(thing) else thing
