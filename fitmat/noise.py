@@ -9,10 +9,13 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import minimize
 
-from fitmat.measurement import Measurements
+from fitmat.measurement import IN_PLANE, Measurements
 
 MIN_RESIDUALS = 12
 """Fewer neighbour comparisons than this say nothing about the noise."""
+
+NEIGHBOURED = 0.05
+"""Fraction of the samples that must have neighbours; where fewer meet on a curve, they do so by chance."""
 
 UNKNOWN_RELATIVE = 1e-3
 """Placeholder noise where none can be estimated: small, so that the inferred discrepancy takes its place."""
@@ -26,6 +29,8 @@ COPIED = 1e-12
 """A scatter below this fraction of the maximum is that of copied rows, not of repeated measurements."""
 
 _DIGITS = 4
+_TOGETHER = np.deg2rad(0.01)
+# Angles are rounded to this to tell curves apart, so that samples closer than it are no neighbours.
 _UNEVEN = 12.0
 # Ratio of the gaps between five angles from which they are no curve but samples that meet by chance.
 _T_DOF = 4.0
@@ -66,7 +71,8 @@ def measured_noise(m: Measurements) -> Noise:
         used = np.isfinite(error)
         smooth = np.where(np.isfinite(level), np.abs(level), np.abs(m.value[:, k]))
         top = float(np.max(np.abs(m.value[m.valid[:, k], k]), initial=0.0))
-        if used.sum() < MIN_RESIDUALS or np.median(np.abs(error[used])) <= COPIED * top:
+        fewest = max(MIN_RESIDUALS, NEIGHBOURED * np.count_nonzero(m.valid[:, k]))
+        if used.sum() < fewest or np.median(np.abs(error[used])) <= COPIED * top:
             sigma[:, k] = UNKNOWN_RELATIVE * np.maximum(smooth, UNKNOWN_RELATIVE * max(top, 1e-12))
             words.append("")
             continue
@@ -88,8 +94,11 @@ def _curves(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray, np.n
     still, moving = m.theta_i, m.theta_o
     if len(np.unique(np.round(still[rows], _DIGITS))) > len(np.unique(np.round(moving[rows], _DIGITS))):
         still, moving = moving, still
-    side = np.where(m.in_plane & (m.phi < np.pi / 2), -1.0, 1.0)
-    plane = np.where(m.in_plane, 0.0, np.round(np.rad2deg(m.phi), 2))[rows]
+    # About the normal every azimuth is in the plane, but only at the normal itself are all the same.
+    flat = np.minimum(m.phi, np.pi - m.phi) < IN_PLANE
+    flat |= np.minimum(m.theta_i, m.theta_o) < _TOGETHER
+    side = np.where(flat & (m.phi < np.pi / 2), -1.0, 1.0)
+    plane = np.where(flat, 0.0, np.round(np.rad2deg(m.phi), 2))[rows]
     keys = np.stack([np.round(np.rad2deg(still[rows]), 2), plane], axis=1)
     curve = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)
     angle = (side * moving)[rows]
@@ -122,6 +131,7 @@ def leave_one_out(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray
     scale = np.median(np.abs(y)) or 1.0
     gaps = np.diff(x[inner[:, None] + np.arange(-2, 3)], axis=1)
     even = gaps.max(axis=1, initial=0.0) <= _UNEVEN * gaps.min(axis=1, initial=np.inf)
+    even &= gaps.min(axis=1, initial=np.inf) > _TOGETHER
     inner, near = inner[even], near[even]
     weights = _lagrange(x[near], x[inner])
     predicted = scale * np.sinh((weights * np.arcsinh(mean[near] / scale)).sum(axis=1))

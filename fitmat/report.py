@@ -52,7 +52,7 @@ def to_dict(posteriors: Sequence[Posterior], match: Comparison | None) -> dict[s
             "n_samples": m.n_samples,
             "n_masked": m.n_masked,
             "masked": m.masked,
-            "notes": list(m.notes),
+            "notes": [*m.notes, *filter(None, [str(m.instrument)])],
             "noise": posteriors[0].fit.noise.words,
             "channels": list(m.channels),
             "fits": [_fit_dict(p, len(m.channels)) for p in posteriors],

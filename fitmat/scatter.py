@@ -12,6 +12,7 @@ from fitmat.measurement import Measurements
 from fitmat.noise import (
     COPIED,
     MIN_RESIDUALS,
+    NEIGHBOURED,
     UNKNOWN,
     UNKNOWN_RELATIVE,
     Noise,
@@ -94,7 +95,7 @@ def scatter(chunks: Rows, progress: Progress | None = None) -> Scatter:
 
 def _law(error: np.ndarray, smooth: np.ndarray, factor: np.ndarray, top: float) -> Float[np.ndarray, " 2"]:
     used = np.isfinite(error)
-    if used.sum() < MIN_RESIDUALS or np.median(np.abs(error[used])) <= COPIED * top:
+    if used.sum() < max(MIN_RESIDUALS, NEIGHBOURED * len(error)) or np.median(np.abs(error[used])) <= COPIED * top:
         return np.full(2, np.nan)
     return np.array(components(error[used], smooth[used], factor[used]))
 
