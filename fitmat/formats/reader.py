@@ -1,4 +1,4 @@
-"""Reader: a table from anywhere → `Measurements`, with every assumption in its notes.
+"""Reader: a file of any format, or a table from anywhere → `Measurements`, with every assumption in its notes.
 
 It repairs nothing and drops nothing; what it cannot know it asks for.
 """
@@ -79,9 +79,10 @@ def read(
     unknown_scale: bool = False,
     instrument: Instrument = IDEAL,
 ) -> Measurements:
-    """Read BRDF measurements from a text table, a data frame or a dict of arrays.
+    """Read BRDF measurements from a file, a data frame, an xarray object or a dict of arrays.
 
-    Columns, in any letter case (`fitmat.formats.columns.ALIASES` has more names):
+    Files of `FORMATS` are recognised by their content and say what they hold. Of text tables, Parquet files and the rest
+    the columns are recognised, in any letter case (`fitmat.formats.columns.ALIASES` has more names):
 
     - theta_i, theta_o, and phi = φ_o − φ_i or phi_i and phi_o, in degrees; the mirror side is φ = 180.
       Without azimuth, theta_o is signed: positive is forward, the mirror side.
@@ -91,7 +92,7 @@ def read(
     - Where known: sigma, or sigma_r …, in the unit of the quantity (and sigma_reference); valid, or flag.
 
     Args:
-        source: Path of a file, pandas or polars data frame, or name → array of n numbers.
+        source: Path of a file, pandas or polars data frame, xarray object, or name → array of n numbers.
         columns: Our name → name or number (from 1) in the file; or as text, "theta_i=Zenith,theta_o=3".
         quantity: What a column called value holds: "brdf", "brdf_cos", "reflectance_factor", "radiance" or
             "panel_ratio".
