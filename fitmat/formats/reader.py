@@ -81,8 +81,8 @@ def read(
 ) -> Measurements:
     """Read BRDF measurements from a file, a data frame, an xarray object or a dict of arrays.
 
-    Files of `FORMATS` are recognised by their content and say what they hold. Of text tables, Parquet files and the rest
-    the columns are recognised, in any letter case (`fitmat.formats.columns.ALIASES` has more names):
+    Files of `FORMATS` are recognised by their content and say what they hold. Of text tables, Parquet files and the
+    rest the columns are recognised, in any letter case (`fitmat.formats.columns.ALIASES` has more names):
 
     - theta_i, theta_o, and phi = φ_o − φ_i or phi_i and phi_o, in degrees; the mirror side is φ = 180.
       Without azimuth, theta_o is signed: positive is forward, the mirror side.
