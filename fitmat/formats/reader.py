@@ -143,9 +143,10 @@ def measured(recording: Recording, options: Options) -> Measurements:
     with np.errstate(over="ignore", invalid="ignore"):
         value = recording.value * scale
         sigma = None if recording.sigma is None else recording.sigma * scale
-    extreme = valid & ~(np.isfinite(value) & np.isfinite(0.0 if sigma is None else sigma))
+    usable = np.isfinite(value) if sigma is None else np.isfinite(value) & np.isfinite(sigma) & (sigma > 0)
+    extreme = valid & ~usable
     if extreme.any():
-        masked |= {"infinite in sr⁻¹": int(extreme.any(axis=1).sum())}
+        masked |= {"too large or too small a number in sr⁻¹": int(extreme.any(axis=1).sum())}
         valid = valid & ~extreme
     return Measurements(
         wi=wi,
