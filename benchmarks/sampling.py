@@ -25,7 +25,7 @@ import numpy as np
 from peer import Problem
 
 import fitmat as fm
-from fitmat import uncertainty
+from fitmat import density, uncertainty
 
 WALKERS = 32
 NAMES = ("kd", "ks", "ln alpha", "ln eta", "s")
@@ -125,7 +125,7 @@ def main() -> None:
 def check_density(found: fm.Fit, peer: Problem) -> None:
     """Both log posteriors are the same function."""
     draws = natural(fm.laplace(found, seed=0))[:50]
-    one, other = uncertainty.log_posterior(found)(draws), peer.log_posterior(draws)
+    one, other = density.log_posterior(found)(draws), peer.log_posterior(draws)
     difference = float(np.max(np.abs(one - other)))
     singly = float(np.max(np.abs(other - [peer.log_posterior(x) for x in draws])))
     print(f"log posterior, compiled and numpy: largest difference {difference:.1e} at 50 draws")

@@ -1,3 +1,4 @@
+from .approximation import laplace as laplace
 from .brdf import evaluate as evaluate
 from .brdf import model as model
 from .comparison import Comparison as Comparison
@@ -24,7 +25,6 @@ from .posterior import Posterior as Posterior
 from .prediction import sections as sections
 from .slab import evaluate_slab as evaluate_slab
 from .synthetic import simulate as simulate
-from .uncertainty import laplace as laplace
 from .uncertainty import sample as sample
 from .walk import albedo_walk as albedo_walk
 from .walk import evaluate_walk as evaluate_walk

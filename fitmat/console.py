@@ -17,6 +17,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn
 from rich.table import Table
 from rich.text import Text
 
+from fitmat.approximation import laplace, laplace_each
 from fitmat.brdf import LOBES, lobe_names, model, normalised
 from fitmat.bulk import fit_chunks
 from fitmat.comparison import Comparison, compare, is_empirical, is_microfacet
@@ -28,7 +29,7 @@ from fitmat.params import entries
 from fitmat.posterior import Posterior
 from fitmat.report import rows
 from fitmat.rows import Rows, held
-from fitmat.uncertainty import laplace, laplace_each, sample
+from fitmat.uncertainty import sample
 
 MOST_AT_ONCE = 100_000
 """Rows above which a fit passes over the data block by block."""

@@ -11,12 +11,13 @@ import xarray
 from scipy import stats
 
 import fitmat as fm
+from fitmat.density import log_posterior
 from fitmat.errors import FitmatError
 from fitmat.likelihood import log_likelihood, noise_scale
 from fitmat.outcome import Fit
 from fitmat.params import space, vector, with_vector
 from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, Diagnostics, Posterior, split_rhat
-from fitmat.uncertainty import CHUNK, log_posterior
+from fitmat.uncertainty import CHUNK
 
 QUANTILE = 0.15
 """In standard deviations: three Monte Carlo errors, 2.7/√ESS, of an outer quantile from about 1600 effective draws,

@@ -1,0 +1,69 @@
+"""The posterior density over the coordinates that are sampled, and the way back to physical parameters.
+
+Sampled are the free natural coordinates (`apparent` weights) and, last, the discrepancy s. Priors are flat within the
+bounds: in the logarithm for parameters whose scale is log (alpha, exponent, eta, kappa, f0), linearly for kd, ks and
+s ≥ 0; a shared scale g has ln g ~ N(0, calibration²). Nothing is drawn here.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+from fitmat.apparent import Apparent, apparent
+from fitmat.brdf import AbstractBRDF
+from fitmat.likelihood import Data, log_density, mapped
+from fitmat.outcome import Fit
+from fitmat.params import space, vector, with_vector
+
+
+def default_walkers(fit: Fit) -> int:
+    """The larger of 32 and four per sampled dimension."""
+    return max(32, 4 * (len(fit.free) + 1))
+
+
+def log_posterior(fit: Fit, batch: int = 1) -> Callable[[np.ndarray], np.ndarray]:
+    """The log posterior density over (w, free + 1) sampled coordinates as one compiled call; −inf outside.
+
+    Args:
+        fit: What is sampled.
+        batch: Smaller w are filled up to this many, so that one program serves whole and half ensembles.
+    """
+    free = tuple(int(k) for k in fit.free)
+    arrays, static = eqx.partition((fit.model, fit.data), eqx.is_array)
+
+    where = apparent(fit)
+
+    def call(coordinates: np.ndarray) -> np.ndarray:
+        filled = np.pad(coordinates, ((0, max(0, batch - len(coordinates))), (0, 0)), mode="edge")
+        return np.asarray(_log_posterior(arrays, static, free, where, jnp.asarray(filled)))[: len(coordinates)]
+
+    return call
+
+
+@eqx.filter_jit
+def _log_posterior(arrays: Any, static: Any, free: tuple[int, ...], where: Apparent, coordinates: Array) -> Array:
+    template, data = eqx.combine(arrays, static)
+    return mapped(lambda x: _log_density(template, data, free, where, x), coordinates)
+
+
+def _log_density(template: AbstractBRDF, data: Data, free: tuple[int, ...], where: Apparent, x: Array) -> Array:
+    whole, places = space(template), np.array(free, int)
+    natural = where.natural(x)
+    t, s = natural[:-1], natural[-1]
+    inside = jnp.all((t >= whole.natural_lower[places]) & (t <= whole.natural_upper[places])) & (s >= 0.0)
+    full = whole.natural(vector(template)).at[places].set(jnp.where(inside, t, whole.natural_lower[places]))
+    value = log_density(with_vector(template, whole.physical(full)), data, jnp.abs(s))
+    return jnp.where(inside & jnp.isfinite(value), value, -jnp.inf)
+
+
+def physical(fit: Fit, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sampled coordinates (m, free + 1) to full physical vectors (m, p) and discrepancies (m,)."""
+    whole, natural = space(fit.model), apparent(fit).natural_array(coordinates)
+    full = np.tile(fit.values, (len(natural), 1))
+    log = whole.log[fit.free]
+    full[:, fit.free] = np.where(log, np.exp(np.where(log, natural[:, :-1], 0.0)), natural[:, :-1])
+    return full, natural[:, -1]
