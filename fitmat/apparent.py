@@ -2,7 +2,8 @@
 
 Where all values share an error g of the scale, the data determine g k_d and g k_s, and hardly g: in k_d and ln g the
 posterior is a thin, bent ridge, in the products it is straight. The priors of the weights are flat in the products,
-so that g keeps its own prior where the data say nothing of it. Nothing here knows the data.
+so that g keeps its own prior where the data say nothing of it; a weight with a stated prior is no such coordinate.
+Nothing here knows the data.
 """
 
 import dataclasses
@@ -63,4 +64,6 @@ def apparent(fit: Fit) -> Apparent:
     if not scale:
         return Apparent()
     weights = [k for e in fit.entries if e.param.weight for k in range(e.place.start, e.place.stop)]
-    return Apparent(tuple(places[k] for k in weights if k in places), places[scale[0]])
+    prior = fit.data.prior
+    stated = set() if prior is None else set(np.flatnonzero(np.asarray(prior.precision) > 0).tolist())
+    return Apparent(tuple(places[k] for k in weights if k in places and k not in stated), places[scale[0]])

@@ -49,6 +49,7 @@ def fit_chunks(
     to: str | AbstractBRDF,
     *,
     fixed: Mapping[str, ArrayLike] | None = None,
+    priors: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
     masking: str | None = None,
     progress: Progress | None = None,
 ) -> Fit:
@@ -61,6 +62,7 @@ def fit_chunks(
         chunks: A file, from `fitmat.formats.chunks.scan`, or measurements in memory, from `fitmat.rows.held`.
         to: A model name ("lambert+ggx"), or a model whose shapes and static choices are used.
         fixed: Parameters to hold, by name: `{"ks": 1.0}`.
+        priors: What is known beforehand, by name, as in `fitting.fit`.
         masking: Static masking choice for the microfacet lobes of a named model.
         progress: Called after each chunk of each pass.
 
@@ -72,7 +74,9 @@ def fit_chunks(
     """
     known = scatter(chunks, progress)
     part_noise = known.of_part(chunks.part)
-    start = fitting.fit(dataclasses.replace(chunks.part, sigma=part_noise.sigma), to, fixed=fixed, masking=masking)
+    start = fitting.fit(
+        dataclasses.replace(chunks.part, sigma=part_noise.sigma), to, fixed=fixed, priors=priors, masking=masking
+    )
     start = dataclasses.replace(start, measurements=chunks.part, noise=part_noise)
     if not start.finite:
         return start
@@ -104,7 +108,7 @@ class _File(NamedTuple):
     def sums(self, best: AbstractBRDF, s: float, what: str) -> Sums:
         """The sums of all rows and of the prior."""
         rows = self.added(lambda data: jax.device_get(block_sums(best, data, jnp.asarray(s))), what)
-        return jax.tree.map(np.add, rows, jax.device_get(prior_sums(best, self.start.data)))
+        return jax.tree.map(np.add, rows, jax.device_get(prior_sums(best, self.start.data, jnp.asarray(s))))
 
 
 class _Range:
@@ -216,11 +220,9 @@ def _concluded(file: _File, around: _Range, top: _Top) -> Fit:
     if s >= FOLLOWS * float(noise_scale(start.data)):
         at = jnp.asarray(s)
         observed = file.added(lambda data: np.asarray(observed_information(best, data, at)), "curvature")
-        observed = observed + np.asarray(prior_sums(best, start.data).gram)
+        observed = observed + np.asarray(prior_sums(best, start.data, at).gram)
         information = observed if _positive(observed[np.ix_(free, free)]) else information
-    prior = start.data.prior
-    told = np.zeros(len(free), bool) if prior is None else np.asarray(prior.precision)[free] > 0
-    spread, undetermined = covariance(best, information, free, told)
+    spread, undetermined = covariance(best, information, free, start.data.told(free))
     values = np.asarray(vector(best))
     on_bound = bool(space(best).at_bound(values)[free].any())
     return dataclasses.replace(
@@ -234,6 +236,7 @@ def _concluded(file: _File, around: _Range, top: _Top) -> Fit:
         covariance=spread,
         undetermined=undetermined,
         n_values=file.chunks.n_valid,
+        misfit=s,
         discrepancy_sd=_discrepancy_sd(top.sums),
     )
 

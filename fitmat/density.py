@@ -1,8 +1,7 @@
 """The posterior density over the coordinates that are sampled, and the way back to physical parameters.
 
-Sampled are the free natural coordinates (`apparent` weights) and, last, the discrepancy s. Priors are flat within the
-bounds: in the logarithm for parameters whose scale is log (alpha, exponent, eta, kappa, f0), linearly for kd, ks and
-s ≥ 0; a shared scale g has ln g ~ N(0, calibration²). Nothing is drawn here.
+Sampled are the free natural coordinates (`apparent` weights) and, last, the discrepancy s, which is inert under a loss
+that infers none. The priors are those of `priors`. Nothing is drawn here.
 """
 
 from collections.abc import Callable
@@ -15,7 +14,7 @@ from jaxtyping import Array
 
 from fitmat.apparent import Apparent, apparent
 from fitmat.brdf import AbstractBRDF
-from fitmat.likelihood import Data, log_density, mapped
+from fitmat.likelihood import Data, log_density, mapped, noise_scale
 from fitmat.outcome import Fit
 from fitmat.params import space, vector, with_vector
 
@@ -47,16 +46,26 @@ def log_posterior(fit: Fit, batch: int = 1) -> Callable[[np.ndarray], np.ndarray
 @eqx.filter_jit
 def _log_posterior(arrays: Any, static: Any, free: tuple[int, ...], where: Apparent, coordinates: Array) -> Array:
     template, data = eqx.combine(arrays, static)
-    return mapped(lambda x: _log_density(template, data, free, where, x), coordinates)
+    return mapped(lambda x: log_density_at(template, data, free, where, x), coordinates)
 
 
-def _log_density(template: AbstractBRDF, data: Data, free: tuple[int, ...], where: Apparent, x: Array) -> Array:
+def log_density_at(template: AbstractBRDF, data: Data, free: tuple[int, ...], where: Apparent, x: Array) -> Array:
+    """The log posterior density at one point of the sampled coordinates, traceable by JAX; −inf outside.
+
+    Args:
+        template: The fit's model, which holds what is fixed.
+        data: The samples.
+        free: Places of the free parameters in the model's vector.
+        where: Which of the coordinates are apparent weights.
+        x: The point, (free + 1,), s last.
+    """
     whole, places = space(template), np.array(free, int)
     natural = where.natural(x)
     t, s = natural[:-1], natural[-1]
     inside = jnp.all((t >= whole.natural_lower[places]) & (t <= whole.natural_upper[places])) & (s >= 0.0)
     full = whole.natural(vector(template)).at[places].set(jnp.where(inside, t, whole.natural_lower[places]))
-    value = log_density(with_vector(template, whole.physical(full)), data, jnp.abs(s))
+    inert = jnp.zeros(()) if data.loss.infers_discrepancy else 0.5 * (s / noise_scale(data)) ** 2
+    value = log_density(with_vector(template, whole.physical(full)), data, _inferred(data, jnp.abs(s))) - inert
     return jnp.where(inside & jnp.isfinite(value), value, -jnp.inf)
 
 
@@ -66,4 +75,9 @@ def physical(fit: Fit, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     full = np.tile(fit.values, (len(natural), 1))
     log = whole.log[fit.free]
     full[:, fit.free] = np.where(log, np.exp(np.where(log, natural[:, :-1], 0.0)), natural[:, :-1])
-    return full, natural[:, -1]
+    return full, _inferred(fit.data, natural[:, -1])
+
+
+def _inferred(data: Data, s: Any) -> Any:
+    """s where the loss infers it, else 0: its coordinate is then inert, so that every sampler sees the same shape."""
+    return s if data.loss.infers_discrepancy else 0.0 * s

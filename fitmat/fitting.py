@@ -13,24 +13,25 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, ArrayLike
 
-from fitmat.brdf import AbstractBRDF, Seen, evaluate_pairs, model
+from fitmat.brdf import LEAST_ABSOLUTE, AbstractBRDF, Noisy, Seen, evaluate_pairs, model
 from fitmat.errors import FitmatError, ModelError
-from fitmat.instrument import Instrument
 from fitmat.likelihood import (
     Data,
-    Prior,
     best_discrepancy,
     every_residual,
     first_discrepancy,
     log_density,
     mapped,
     prepare,
-    stabilised,
+    transformed,
 )
+from fitmat.losses import DEFAULT
+from fitmat.losses import loss as find_loss
 from fitmat.measurement import Measurements
 from fitmat.noise import measured_noise
 from fitmat.outcome import Ends, Fit, conclude, free_places
 from fitmat.params import Space, check_range, entries, space, vector, with_vector
+from fitmat.priors import prepared
 from fitmat.solver import Minimum, Units, least_squares
 from fitmat.starts import starting_points
 
@@ -58,6 +59,8 @@ def fit(
     to: str | AbstractBRDF,
     *,
     fixed: Mapping[str, ArrayLike] | None = None,
+    priors: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
+    loss: str = DEFAULT.name,
     masking: str | None = None,
     max_steps: int = 256,
 ) -> Fit:
@@ -67,6 +70,9 @@ def fit(
         measurements: From `fitmat.read`.
         to: A model name ("lambert+ggx"), or a model whose shapes and static choices are used.
         fixed: Parameters to hold, by name: `{"ks": 1.0}`.
+        priors: What is known beforehand, by name: centre and standard deviation, `{"eta": (1.5, 0.05)}`; see
+            `fitmat.priors`.
+        loss: What is minimised, by name (`fitmat.losses`); only a likelihood supports a posterior.
         masking: Static masking choice for the microfacet lobes of a named model.
         max_steps: Levenberg–Marquardt iterations per start and round.
 
@@ -74,7 +80,8 @@ def fit(
         A `Fit`; a numerical failure is its `result`, not an exception.
 
     Raises:
-        FitmatError: float64 is off, the model is unknown, or there are too few valid samples.
+        FitmatError: float64 is off, the model is unknown, a prior is not of this model, or there are too few valid
+            samples.
 
     Example:
         >>> fit(read("measurements.csv"), "lambert+ggx", fixed={"ks": 1.0})  # doctest: +SKIP
@@ -85,17 +92,27 @@ def fit(
         )
     channels = len(measurements.channels)
     template = model(to, channels=channels, masking=masking) if isinstance(to, str) else to
+    chosen = find_loss(loss)
     shown = _seen(template, measurements)
+    known = dict(priors or {})
+    if chosen.infers_noise:
+        shown, known = Noisy(shown), _noise_priors(measurements) | known
     held = _held(shown, fixed or {})
     free = free_places(shown, held)
     needed = len(free) + 2
-    if measurements.n_valid < needed:
+    found_noise = measured_noise(measurements)
+    if chosen.needs_noise and not found_noise.known:
         raise FitmatError(
-            f"{measurements.source}: {measurements.n_valid} valid samples, but {template.name} has {len(free)} free "
+            f"{measurements.source}: the loss {chosen.name} needs the noise, and it is not known; give a column sigma, "
+            f"or choose another loss (default infers what is needed)."
+        )
+    data = prepare(measurements, found_noise, prepared(shown, measurements.instrument, known), chosen)
+    usable = int(np.count_nonzero(data.weight))
+    if usable < needed:
+        raise FitmatError(
+            f"{measurements.source}: {usable} valid samples, but {template.name} has {len(free)} free "
             f"parameters and needs at least {needed}; measure more angles or fix parameters (--fix ks=1)."
         )
-    found_noise = measured_noise(measurements)
-    data = prepare(measurements, found_noise, _prior(shown, measurements.instrument))
     first = first_discrepancy(data)
     starts = starting_points(template, data, first, held, STARTS)
     added = np.asarray(vector(shown))[len(vector(template)) :]
@@ -117,14 +134,11 @@ def _seen(template: AbstractBRDF, m: Measurements) -> AbstractBRDF:
     )
 
 
-def _prior(shown: AbstractBRDF, instrument: Instrument) -> Prior | None:
-    """ln g ~ N(0, calibration²); everything else flat."""
-    if not instrument.calibration:
-        return None
-    places = {e.name: e.place for e in entries(shown)}
-    precision = np.zeros(len(vector(shown)))
-    precision[places["scale"]] = 1.0 / instrument.calibration
-    return Prior(jnp.zeros(len(precision)), jnp.asarray(precision))
+def _noise_priors(m: Measurements) -> dict[str, tuple[ArrayLike, ArrayLike]]:
+    """Of an inferred noise: either part is known to an order of magnitude, about 3 % and a hundredth of the median."""
+    middle = float(np.median(np.abs(m.value[m.valid]))) or 1.0
+    centres = {"absolute": np.clip(0.01 * middle, 2.0 * LEAST_ABSOLUTE, 1.0), "relative": 0.03}
+    return {name: (centre, np.log(10.0) * centre) for name, centre in centres.items()}
 
 
 def _held(template: AbstractBRDF, fixed: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
@@ -167,7 +181,8 @@ def _refine(
         return jax.lax.while_loop(lambda state: ~state[2] & (state[5] < ROUNDS), body, begin)
 
     def one(base: Array) -> Ends:
-        u, s, settled, solved, steps, _ = settle(data, base, chart.free(base), first)
+        begin = first if data.loss.infers_discrepancy else jnp.zeros(())
+        u, s, settled, solved, steps, _ = settle(data, base, chart.free(base), begin)
         best = chart.model(base, u)
         return Ends(vector(best), s, log_density(best, data, s), settled & solved, steps)
 
@@ -213,7 +228,7 @@ def descend(chart: Chart, data: Data, values: Array, u: Array, s: Array, *, max_
         return every_residual(chart.model(values, u), data, s, measured)
 
     def minimum(data: Data, u: Array, units: Units | None) -> Minimum:
-        measured = stabilised(data.x, data.noise, s)
+        measured = transformed(data, s)
         return least_squares(residual, u, (data, values, s, measured), max_steps=max_steps, units=units)
 
     rows = data.x.shape[0]

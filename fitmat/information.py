@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat.brdf import AbstractBRDF
-from fitmat.likelihood import Data, every_residual, noise_scale
+from fitmat.likelihood import Data, every_residual, noise_scale, residuals
 from fitmat.params import entries, space, vector, with_vector
 
 UNDETERMINED = {"log": 1.0, "linear": 0.3}
@@ -48,16 +48,28 @@ def information(best: AbstractBRDF, data: Data, s: float, free: np.ndarray) -> F
     """The expected information where the model follows the data, else the observed one if it is positive definite.
 
     For a model that is right they differ by chance only. For one that is not, the residuals are large and their
-    curvature counts: it may determine what the Jacobian alone does not (Efron & Hinkley 1978).
+    curvature counts: it may determine what the Jacobian alone does not (Efron & Hinkley 1978). Under a loss that
+    shrinks residuals or infers the noise, JᵀJ is not the information at all. An objective does not say how far the
+    data scatter: the mean square of its residuals does.
     """
     expected = np.asarray(expected_information(best, data, jnp.asarray(s)))
-    if s < FOLLOWS * float(noise_scale(data)):
+    if data.loss.spread is None:
+        return expected / _mean_square(best, data, len(free))
+    if data.loss.linear and s < FOLLOWS * float(noise_scale(data)):
         return expected
     observed = np.asarray(observed_information(best, data, jnp.asarray(s)))
     part = observed[np.ix_(free, free)]
     scale = np.sqrt(np.abs(np.diagonal(part)) + 1e-300)
     positive = np.isfinite(part).all() and np.linalg.eigvalsh(part / np.outer(scale, scale)).min(initial=1.0) > 1e-9
     return observed if positive else expected
+
+
+def _mean_square(best: AbstractBRDF, data: Data, parameters: int) -> float:
+    r = np.asarray(_residuals(best, data, jnp.zeros(())))
+    return max(float(np.sum(r**2)) / max(np.count_nonzero(data.weight) - parameters, 1), 1e-300)
+
+
+_residuals = eqx.filter_jit(residuals)
 
 
 def inverse_information(information: np.ndarray, span: np.ndarray) -> np.ndarray:

@@ -1,13 +1,9 @@
-"""The likelihood: measurement noise and model discrepancy in one variance-stabilising transform.
+"""The likelihood: the samples as a loss sees them, residuals, log densities, and the best discrepancy.
 
-Compared are x = f κ with κ = cosθ_i. The spread of a measurement about the model is taken as a + d(x): a = κσ is the
-measurement noise, d(x) = 3 s |x|^(2/3) is the model's discrepancy, a constant spread s of ∛x. With
-
-    z(x) = ∫₀ˣ dt/(a + 3 s |t|^(2/3)) = (x/a) · 3(q − atan q)/q³,   q² = 3 s |x|^(2/3)/a,
-
+The default joins measurement noise and model discrepancy in one variance-stabilising transform (`stabilising`):
 z(y κ) is N(z(f κ), 1). Where s → 0 this is the Gaussian likelihood of the raw values, unbiased and as sharp as σ
 allows; where s dominates it is the perceptual cube-root fit. The density in y carries z′ at the *data*, so a model
-gains nothing by inflating itself.
+gains nothing by inflating itself. Other losses come from `losses`.
 
 This room knows no solver, no sampler and no particular model.
 """
@@ -19,32 +15,15 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float
 
 from fitmat._types import Directions, Samples, Scalar
-from fitmat.brdf import AbstractBRDF, evaluate_pairs, padded_length
+from fitmat.brdf import AbstractBRDF, Noisy, evaluate_pairs, padded_length
+from fitmat.losses import DEFAULT, Loss
 from fitmat.measurement import Measurements
-from fitmat.noise import Noise
+from fitmat.noise import Noise, levels
 from fitmat.params import space, vector
-
-
-def _near_shape() -> np.ndarray:
-    """Coefficients, highest first, of 3(q − atan q)/q³ as a polynomial in 2q² − 1 for 0 ≤ q² ≤ 1, exact to 1e-15.
-
-    Interpolated at Chebyshev nodes; the values come from the formula, and from its power series where that cancels.
-    """
-
-    def exact(t: np.ndarray) -> np.ndarray:
-        q = np.sqrt(np.maximum(t, 0.02))
-        series = np.polynomial.polynomial.polyval(t, [(-1.0) ** k * 3.0 / (2 * k + 3) for k in range(12)])
-        return np.where(t < 0.02, series, 3.0 * (q - np.arctan(q)) / q**3)
-
-    fitted = np.polynomial.Chebyshev.interpolate(exact, 20, domain=[0.0, 1.0])
-    return np.polynomial.chebyshev.cheb2poly(fitted.coef)[::-1]
-
-
-_NEAR = _near_shape()
+from fitmat.stabilising import spread
 
 
 class Prior(eqx.Module):
@@ -53,10 +32,12 @@ class Prior(eqx.Module):
     Attributes:
         mean: Of each coordinate, (p,).
         precision: 1/sd of each coordinate, (p,); 0 where the prior is flat.
+        discrepancy: 1/sd of the half-normal of s; 0 where its prior is flat.
     """
 
     mean: Float[Array, " p"]
     precision: Float[Array, " p"]
+    discrepancy: Scalar
 
 
 class Data(eqx.Module):
@@ -70,6 +51,8 @@ class Data(eqx.Module):
         kappa: cosθ_i, (n, 1).
         weight: 1 where valid, 0 where masked, (n, c).
         prior: Of the model's parameters; None where it is flat.
+        loss: What a fit minimises.
+        level: |f| as the neighbouring angles show it, in sr⁻¹, (n, c), where the noise is inferred; else None.
     """
 
     wi: Directions
@@ -79,28 +62,41 @@ class Data(eqx.Module):
     kappa: Float[Array, "n 1"]
     weight: Samples
     prior: Prior | None = None
+    loss: Loss = eqx.field(static=True, default=DEFAULT)
+    level: Samples | None = None
+
+    def told(self, free: np.ndarray) -> np.ndarray:
+        """Which of the free parameters have a prior that is not flat, as `free`."""
+        return np.zeros(len(free), bool) if self.prior is None else np.asarray(self.prior.precision)[free] > 0
 
     def every(self, stride: int) -> "Data":
-        """Each stride-th row, under the same prior."""
+        """Each stride-th row, under the same prior and loss."""
         arrays = (self.wi, self.wo, self.x, self.noise, self.kappa, self.weight)
         wi, wo, x, noise, kappa, weight = (part[::stride] for part in arrays)
-        return Data(wi, wo, x, noise, kappa, weight, self.prior)
+        level = None if self.level is None else self.level[::stride]
+        return Data(wi, wo, x, noise, kappa, weight, self.prior, self.loss, level)
+
+    def under(self, loss: Loss) -> "Data":
+        """The same samples under another loss and a flat prior."""
+        return Data(self.wi, self.wo, self.x, self.noise, self.kappa, self.weight, None, loss)
 
 
-def prepare(m: Measurements, noise: Noise, prior: Prior | None = None) -> Data:
+def prepare(m: Measurements, noise: Noise, prior: Prior | None = None, loss: Loss = DEFAULT) -> Data:
     """Measurements and their noise, ready for the likelihood.
 
-    Rows with nothing valid are left out; rows of weight 0 fill up to `padded_length`, so that files of similar size
-    share compiled programs.
+    Rows with nothing valid are left out; what the loss cannot be applied to has weight 0; rows of weight 0 fill up to
+    `padded_length`, so that files of similar size share compiled programs.
     """
     keep = np.flatnonzero(m.valid.any(axis=1))
     m, sigma = m.rows(keep), noise.sigma[keep]
     kappa = m.wi[:, 2:3]
-    parts = (m.wi, m.wo, m.value * kappa, sigma * kappa, kappa, m.valid.astype(float))
+    weight = m.valid if loss.usable is None else m.valid & loss.usable(m)
+    parts = (m.wi, m.wo, m.value * kappa, sigma * kappa, kappa, weight.astype(float))
     extra = padded_length(len(kappa)) - len(kappa)
     padded = (jnp.asarray(_padded(part, extra, fill)) for part, fill in zip(parts, _FILL, strict=True))
+    level = jnp.asarray(_padded(levels(m), extra, 1.0)) if loss.infers_noise else None
     wi, wo, x, deviation, kappa, weight = padded
-    return Data(wi, wo, x, deviation, kappa, weight, prior)
+    return Data(wi, wo, x, deviation, kappa, weight, prior, loss, level)
 
 
 _FILL = ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 0.0, 1.0, 1.0, 0.0)
@@ -111,91 +107,44 @@ def _padded(part: np.ndarray, extra: int, fill: float | tuple[float, ...]) -> np
     return np.concatenate([part, np.broadcast_to(np.asarray(fill), (extra, part.shape[1]))])
 
 
-@jax.custom_jvp
-def _shape(q2: Array) -> Array:
-    """3(q − atan q)/q³ as a function of q²; for q > 1 by atan q = π/2 − atan(1/q), with the same polynomial."""
-    near = q2 <= 1.0
-    v2 = 1.0 / jnp.where(near, 1.0, q2)
-    v = jnp.sqrt(v2)
-    polynomial = jnp.polyval(jnp.asarray(_NEAR), 2.0 * jnp.where(near, q2, v2) - 1.0)
-    far = 3.0 * v**3 * (1.0 / v - jnp.pi / 2.0 + v * (1.0 - v2 * polynomial / 3.0))
-    return jnp.where(near, polynomial, far)
-
-
-@_shape.defjvp
-def _shape_jvp(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
-    """g′(w) = 3(1/(1 + w) − g)/(2w), which follows from z′(x) = 1/(a + d); by its power series where that cancels."""
-    (w,), (w_dot,) = primals, tangents
-    g = _shape(w)
-    small = w < 1e-3
-    series = -3.0 / 5.0 + w * (6.0 / 7.0 - w * (1.0 - w * 12.0 / 11.0))
-    safe = jnp.where(small, 1.0, w)
-    return g, jnp.where(small, series, 1.5 / safe * (1.0 / (1.0 + safe) - g)) * w_dot
-
-
-def _two_thirds(x: Array) -> Array:
-    """|x|^(2/3), by exp and log: several times faster than a cube root; 0 at 0."""
-    return jnp.exp(jnp.log(jnp.maximum(x * x, 1e-300)) / 3.0)
-
-
-def spread(x: Array, noise: Array, s: Array) -> Array:
-    """a + 3 s |x|^(2/3): the standard deviation of a measurement of x."""
-    return noise + 3.0 * s * _two_thirds(x)
-
-
-@jax.custom_jvp
-def stabilised(x: Array, noise: Array, s: Array) -> Array:
-    """z(x), the module's transform; its derivative in x is 1/(a + 3 s |x|^(2/3)), finite everywhere."""
-    return x / noise * _shape(3.0 * s * _two_thirds(x) / noise)
-
-
-def _stabilised_jvp(primals: tuple, tangents: tuple) -> tuple[Array, Any]:
-    x, noise, s = primals
-    x_dot, _, s_dot = tangents
-    value, change = stabilised(x, noise, s), jnp.zeros(())
-    if not isinstance(x_dot, SymbolicZero):
-        change = x_dot / spread(x, noise, s)
-    if not isinstance(s_dot, SymbolicZero):
-        fixed = _two_thirds(x)
-        change += jax.jvp(lambda t: x / noise * _shape(3.0 * t * fixed / noise), (s,), (s_dot,))[1]
-    return value, jnp.broadcast_to(change, value.shape)
-
-
-stabilised.defjvp(_stabilised_jvp, symbolic_zeros=True)
-
-
-def from_stabilised(z: Array, noise: Array, s: Array) -> Array:
-    """x with z(x) = z, by bisection in ∛|x|; for predictive bands.
-
-    Since a + 3 s u² is at least its larger part and at most twice that, ∛|x| lies between the larger of ∛(a|z|) and
-    s|z|, and ∛(2a|z|) + 2s|z|.
-    """
-    size = jnp.abs(z)
-
-    def halve(_: int, bracket: tuple[Array, Array]) -> tuple[Array, Array]:
-        low, high = bracket
-        middle = 0.5 * (low + high)
-        below = stabilised(middle**3, noise, s) < size
-        return jnp.where(below, middle, low), jnp.where(below, high, middle)
-
-    begin = jnp.maximum(jnp.cbrt(noise * size), s * size), jnp.cbrt(2.0 * noise * size) + 2.0 * s * size
-    low, high = jax.lax.fori_loop(0, HALVINGS, halve, begin)
-    return jnp.sign(z) * (0.5 * (low + high)) ** 3
-
-
-HALVINGS = 50
-"""Bisections of a bracket whose ends are within a factor of 3.3 of each other: ∛x to 15 digits."""
-
-
 def residuals(model: AbstractBRDF, data: Data, s: Scalar) -> Samples:
-    """z(y κ) − z(f κ), (n, c), unit variance under the model; 0 where masked."""
-    return residuals_from(stabilised(data.x, data.noise, s), model, data, s)
+    """T(y κ) − T(f κ), shrunk as the loss has it, (n, c), unit variance under a likelihood; 0 where masked."""
+    return residuals_from(transformed(data, s), model, data, s)
+
+
+def transformed(data: Data, s: Scalar) -> Samples:
+    """T(y κ) with the noise that the data state, (n, c)."""
+    return data.loss.transform(data.x, data.noise, data.kappa, s)
 
 
 def residuals_from(measured: Samples, model: AbstractBRDF, data: Data, s: Scalar) -> Samples:
-    """`residuals` with z(y κ) given, for loops in which s stays."""
+    """`residuals` with T(y κ) given, for loops in which s stays; where the noise is inferred it is not used."""
     predicted = evaluate_pairs(model, data.wi, data.wo) * data.kappa
-    return data.weight * (measured - stabilised(predicted, data.noise, s))
+    noise = data.noise
+    if data.loss.infers_noise:
+        noise = inferred_noise(model, data)
+        measured = data.loss.transform(data.x, noise, data.kappa, s)
+    return data.weight * data.loss.shrink(measured - data.loss.transform(predicted, noise, data.kappa, s))
+
+
+def inferred_noise(model: AbstractBRDF, data: Data) -> Samples:
+    """σ κ as a `Noisy` model has it, (n, c)."""
+    assert isinstance(model, Noisy)
+    return data.kappa * model.sigma(_level(data))
+
+
+def _level(data: Data) -> Samples:
+    assert data.level is not None
+    return data.level
+
+
+def _spread_residuals(model: AbstractBRDF, data: Data) -> Samples:
+    """√(2 ln(σ/σ_least)), (n, c), whose half squares sum to the ln σ of the density; empty where σ is given."""
+    if not data.loss.infers_noise:
+        return jnp.zeros((0, 1))
+    assert isinstance(model, Noisy)
+    level = _level(data)
+    return data.weight * jnp.sqrt(2.0 * jnp.log(model.sigma(level) / model.least_sigma(level)))
 
 
 def prior_residuals(model: AbstractBRDF, data: Data) -> Float[Array, " p"]:
@@ -206,29 +155,39 @@ def prior_residuals(model: AbstractBRDF, data: Data) -> Float[Array, " p"]:
 
 
 def every_residual(model: AbstractBRDF, data: Data, s: Scalar, measured: Samples | None = None) -> Float[Array, " r"]:
-    """`residuals` and `prior_residuals` as one vector, what least squares minimises.
+    """`residuals`, what an inferred noise adds, and `prior_residuals` as one vector, what least squares minimises.
 
     Args:
         model: Where to evaluate.
         data: The samples.
         s: Discrepancy.
-        measured: z(y κ), for loops in which s stays.
+        measured: T(y κ), for loops in which s stays.
     """
-    measured = stabilised(data.x, data.noise, s) if measured is None else measured
+    measured = transformed(data, s) if measured is None else measured
     samples = residuals_from(measured, model, data, s).ravel()
-    return samples if data.prior is None else jnp.concatenate([samples, prior_residuals(model, data)])
+    beside = [_spread_residuals(model, data).ravel()] if data.loss.infers_noise else []
+    known = [] if data.prior is None else [prior_residuals(model, data)]
+    return jnp.concatenate([samples, *beside, *known]) if beside or known else samples
 
 
 def log_density(model: AbstractBRDF, data: Data, s: Scalar) -> Scalar:
     """`log_likelihood` and the log prior density, up to the prior's constant."""
     apart = prior_residuals(model, data)
-    return log_likelihood(model, data, s) - 0.5 * jnp.vdot(apart, apart)
+    return log_likelihood(model, data, s) - 0.5 * jnp.vdot(apart, apart) - discrepancy_cost(data, s)
+
+
+def discrepancy_cost(data: Data, s: Scalar) -> Scalar:
+    """−ln of the prior density of s, up to its constant."""
+    return jnp.zeros(()) if data.prior is None else 0.5 * (data.prior.discrepancy * s) ** 2
 
 
 def log_likelihood(model: AbstractBRDF, data: Data, s: Scalar) -> Scalar:
-    """Log density of the measured values (in sr⁻¹), noise and discrepancy included."""
+    """Log density of the measured values (in sr⁻¹), noise and discrepancy included; of an objective −½ Σ residual²."""
     r = residuals(model, data, s)
-    logs = jnp.log(spread(data.x, data.noise, s)) - jnp.log(data.kappa) + 0.5 * np.log(2.0 * np.pi)
+    if data.loss.spread is None:
+        return -0.5 * jnp.vdot(r, r)
+    noise = inferred_noise(model, data) if data.loss.infers_noise else data.noise
+    logs = jnp.log(data.loss.spread(data.x, noise, data.kappa, s)) - jnp.log(data.kappa) - data.loss.log_peak
     # Dot products, not sums: XLA fuses a sum with what it adds up into a scalar loop, five times slower on a CPU.
     return -0.5 * jnp.vdot(r, r) - jnp.vdot(data.weight, logs)
 
@@ -241,13 +200,18 @@ def best_discrepancy(predicted: Samples, data: Data, start: Scalar) -> Scalar:
         data: The samples.
         start: A positive first guess.
 
-    Newton's method in log s with steps of at most 2; what falls below `NEGLIGIBLE` of the noise is 0.
+    Under losses that infer none it is 0. Newton's method in log s with steps of at most 2; what falls below
+    `NEGLIGIBLE` of the noise is 0.
     """
+    if not data.loss.infers_discrepancy:
+        return jnp.zeros(())
 
     def cost(t: Scalar) -> Scalar:
         s = jnp.exp(t)
-        r = stabilised(data.x, data.noise, s) - stabilised(predicted, data.noise, s)
-        return jnp.vdot(data.weight, 0.5 * r**2 + jnp.log(spread(data.x, data.noise, s)))
+        apart = transformed(data, s) - data.loss.transform(predicted, data.noise, data.kappa, s)
+        r = data.loss.shrink(apart)
+        logs = jnp.log(spread(data.x, data.noise, s))
+        return jnp.vdot(data.weight, 0.5 * r**2 + logs) + discrepancy_cost(data, s)
 
     slope = jax.grad(cost)
     floor = jnp.log(NEGLIGIBLE * noise_scale(data))

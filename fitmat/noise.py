@@ -7,7 +7,7 @@ import dataclasses
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import minimize
+from scipy.optimize import minimize, nnls
 
 from fitmat.measurement import IN_PLANE, Measurements
 
@@ -83,6 +83,23 @@ def measured_noise(m: Measurements) -> Noise:
     if not all(words):
         return Noise(sigma, False, UNKNOWN)
     return Noise(sigma, True, f"Noise estimated from neighbouring angles: {'; '.join(words)}.")
+
+
+def levels(m: Measurements) -> Float[np.ndarray, "n c"]:
+    """|f| as the neighbours of each value show it, in sr⁻¹; its own size where it has none."""
+    found = np.stack([leave_one_out(m, k)[0] for k in range(m.value.shape[1])], axis=1)
+    return np.where(np.isfinite(found), np.abs(found), np.abs(m.value))
+
+
+def noise_law(value: Float[np.ndarray, " n"], sigma: Float[np.ndarray, " n"]) -> tuple[float, float]:
+    """a (sr⁻¹) and b of σ² = a² + (b f)² by non-negative least squares on relative residuals; a is never 0."""
+    unit = float(sigma.max())
+    value, sigma = value / unit, sigma / unit
+    squares = np.stack([np.ones_like(value), value**2], axis=1) / sigma[:, None] ** 2
+    scale = np.abs(squares).max(axis=0) + 1e-300
+    (a2, b2), _ = nnls(squares / scale, np.ones_like(value)) if len(value) > 1 else ((sigma[0] ** 2 * scale[0], 0.0), 0)
+    lowest = 1e-3 * float(sigma.min())
+    return unit * float(max(np.sqrt(a2 / scale[0]), lowest)), float(np.sqrt(b2 / scale[1]))
 
 
 def _curves(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -4,6 +4,7 @@ Finds nothing itself; `fitting` does.
 """
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,10 +13,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.brdf import AbstractBRDF
+from fitmat.brdf import AbstractBRDF, evaluate_pairs
 from fitmat.display import html_table, text_table, with_error
 from fitmat.information import FOLLOWS, MISSES, covariance, information
-from fitmat.likelihood import Data, noise_scale
+from fitmat.likelihood import Data, best_discrepancy, first_discrepancy, noise_scale
+from fitmat.losses import DEFAULT, Loss
 from fitmat.measurement import Measurements
 from fitmat.noise import Noise
 from fitmat.params import Entry, entries, space, vector, with_vector
@@ -57,6 +59,7 @@ class Fit:
         covariance: Of all physical parameters, (p, p); 0 for fixed ones, NaN for those on a bound.
         undetermined: Names of parameters that these data do not determine.
         n_values: Values that were fitted; more than `measurements` holds where these are a part of a large file.
+        misfit: The same spread of ∛(f cosθ_i) by the default likelihood, whatever the loss.
         discrepancy_sd: Standard deviation of s where it is known from all values of a large file; else None.
     """
 
@@ -76,6 +79,7 @@ class Fit:
     covariance: Float[np.ndarray, "p p"]
     undetermined: tuple[str, ...]
     n_values: int
+    misfit: float
     discrepancy_sd: float | None = None
 
     @property
@@ -94,14 +98,24 @@ class Fit:
         return free_places(self.model, self.held)
 
     @property
+    def loss(self) -> Loss:
+        """What was minimised."""
+        return self.data.loss
+
+    @property
     def finite(self) -> bool:
         """Whether there is an optimum to sample around."""
         return bool(np.isfinite(self.log_likelihood) and np.isfinite(self.values).all())
 
     @property
+    def n_inferred(self) -> int:
+        """Free parameters, and the discrepancy where the loss infers it."""
+        return len(self.free) + self.loss.infers_discrepancy
+
+    @property
     def misfit_ratio(self) -> float:
         """Discrepancy over measurement noise for the typical sample: the adequacy of the model."""
-        return self.discrepancy / max(float(noise_scale(self.data)), 1e-300)
+        return self.misfit / max(float(noise_scale(self.data)), 1e-300)
 
     @property
     def adequacy(self) -> str:
@@ -141,14 +155,18 @@ class Fit:
 
     @property
     def aicc(self) -> float:
-        """Akaike's criterion with the small-sample correction (Hurvich & Tsai 1989); discrepancy counted."""
-        n, k = self.n_values, len(self.free) + 1
+        """Akaike's criterion with the small-sample correction (Hurvich & Tsai 1989); NaN of an objective."""
+        if not self.loss.posterior:
+            return math.nan
+        n, k = self.n_values, self.n_inferred
         return 2 * k - 2 * self.log_likelihood + 2 * k * (k + 1) / max(n - k - 1, 1)
 
     @property
     def bic(self) -> float:
-        """Schwarz's criterion; discrepancy counted."""
-        return (len(self.free) + 1) * np.log(self.n_values) - 2 * self.log_likelihood
+        """Schwarz's criterion; NaN of an objective."""
+        if not self.loss.posterior:
+            return math.nan
+        return self.n_inferred * np.log(self.n_values) - 2 * self.log_likelihood
 
 
 def free_places(template: AbstractBRDF, held: Mapping[str, Any]) -> np.ndarray:
@@ -185,8 +203,7 @@ def conclude(
     free = free_places(template, held)
     bounds = space(template).at_bound(np.asarray(ends.values[k]))
     known = information(best, data, s, free)
-    told = np.zeros(len(free), bool) if data.prior is None else np.asarray(data.prior.precision)[free] > 0
-    spread, undetermined = covariance(best, known, free, told)
+    spread, undetermined = covariance(best, known, free, data.told(free))
     return Fit(
         name=template.name,
         model=best,
@@ -203,8 +220,20 @@ def conclude(
         information=known,
         covariance=spread,
         undetermined=undetermined,
-        n_values=m.n_valid,
+        n_values=int(np.count_nonzero(data.weight)),
+        misfit=s if data.loss.infers_discrepancy else _misfit(best, data),
     )
+
+
+def _misfit(best: AbstractBRDF, data: Data) -> float:
+    plain = data.under(DEFAULT)
+    return float(_default_discrepancy(best, plain))
+
+
+@eqx.filter_jit
+def _default_discrepancy(best: AbstractBRDF, data: Data) -> Array:
+    predicted = evaluate_pairs(best, data.wi, data.wo) * data.kappa
+    return best_discrepancy(predicted, data, first_discrepancy(data))
 
 
 def named_outcome(usable: bool, solved: bool, on_bound: bool, undetermined: tuple[str, ...]) -> str:

@@ -14,11 +14,13 @@ from scipy.special import ndtri
 
 from fitmat.brdf import AbstractBRDF, evaluate, evaluate_pairs
 from fitmat.geometry import from_angles
-from fitmat.likelihood import Data, from_stabilised, prepare, residuals, stabilised
+from fitmat.likelihood import Data, prepare, residuals
 from fitmat.measurement import Measurements
 from fitmat.outcome import Fit
 from fitmat.params import with_vector
 from fitmat.posterior import Posterior
+from fitmat.losses import DEFAULT
+from fitmat.stabilising import from_stabilised, stabilised
 
 BAND_DRAWS = 200
 
@@ -62,9 +64,15 @@ def curve(fit: Fit, section: Section, theta_o: Float[np.ndarray, " k"]) -> Float
     return evaluate(fit.model, wi, wo)
 
 
-def standardised_residuals(fit: Fit) -> Float[np.ndarray, "n c"]:
-    """What the best fit leaves over, in standard deviations of noise and discrepancy; rows as in `fit.data`."""
-    return np.asarray(_residuals(fit.model, fit.data, jnp.asarray(fit.discrepancy)))
+def standardised_residuals(fit: Fit, *, misfit: bool = True) -> Float[np.ndarray, "n c"]:
+    """What the best fit leaves over, in standard deviations of noise and misfit; rows as in `fit.data`.
+
+    Args:
+        fit: Under any loss: the transform is the default's, so that all are comparable.
+        misfit: Whether the misfit counts; else in standard deviations of the noise alone.
+    """
+    s = jnp.asarray(fit.misfit if misfit else 0.0)
+    return np.asarray(_residuals(fit.model, fit.data.under(DEFAULT), s))
 
 
 _residuals = eqx.filter_jit(residuals)

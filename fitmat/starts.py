@@ -12,8 +12,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat.brdf import AbstractBRDF, evaluate_pairs
-from fitmat.likelihood import Data, spread, stabilised
+from fitmat.likelihood import Data
 from fitmat.params import Entry, entries, vector, with_vector
+from fitmat.stabilising import spread, stabilised
 
 MAX_ROWS = 4000
 """The grid looks at no more rows than this, evenly spread over the file."""

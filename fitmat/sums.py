@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat.brdf import AbstractBRDF
-from fitmat.likelihood import Data, log_likelihood, prepare, prior_residuals, residuals
+from fitmat.likelihood import Data, discrepancy_cost, log_likelihood, prepare, prior_residuals, residuals
 from fitmat.measurement import Measurements
 from fitmat.noise import Noise
 from fitmat.params import space, vector, with_vector
@@ -64,16 +64,19 @@ def block_sums(best: AbstractBRDF, data: Data, s: Array) -> Sums:
     return Sums(cost, gradient, gram, change, mixed, curvature)
 
 
-def prior_sums(best: AbstractBRDF, data: Data) -> Sums:
+def prior_sums(best: AbstractBRDF, data: Data, s: Array) -> Sums:
     """The sums of what is known beforehand; all 0 where the prior is flat."""
     coordinates = space(best)
-    at, none = coordinates.natural(vector(best)), jnp.zeros(())
+    at = coordinates.natural(vector(best))
 
     def apart(t: Array) -> Array:
         return prior_residuals(with_vector(best, coordinates.physical(t)), data)
 
     r, jacobian = apart(at), jax.jacfwd(apart)(at)
-    return Sums(0.5 * jnp.vdot(r, r), jacobian.T @ r, jacobian.T @ jacobian, none, 0.0 * at, none)
+    slope = jax.grad(discrepancy_cost, argnums=1)
+    change, curvature = jax.jvp(lambda s: slope(data, s), (s,), (jnp.ones_like(s),))
+    cost = 0.5 * jnp.vdot(r, r) + discrepancy_cost(data, s)
+    return Sums(cost, jacobian.T @ r, jacobian.T @ jacobian, change, 0.0 * at, curvature)
 
 
 def blocks(chunk: Measurements, noise: Noise) -> Iterator[Data]:

@@ -16,7 +16,8 @@ from fitmat.examination.coverage import coverage, mirror_frame
 from fitmat.examination.examining import Examination, examine
 from fitmat.examination.features import peak
 from fitmat.examination.implied_albedo import implied_albedo
-from fitmat.examination.prospects import noise_law, prospects
+from fitmat.examination.prospects import prospects
+from fitmat.noise import noise_law
 
 SEEDS = 20
 """Draws of the noise; a check that raises a false alarm in 14 % of clean files is caught in 95 of 100 cases."""

@@ -19,15 +19,13 @@ from fitmat.likelihood import (
     Data,
     best_discrepancy,
     first_discrepancy,
-    from_stabilised,
     log_likelihood,
     noise_scale,
     prepare,
     residuals,
-    spread,
-    stabilised,
 )
 from fitmat.noise import Noise
+from fitmat.stabilising import from_stabilised, spread, stabilised
 
 QUADRATURE = 1e-9
 """Relative; quad is asked for 1e-11."""

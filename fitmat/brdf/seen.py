@@ -13,6 +13,7 @@ from jaxtyping import Float
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.brdf.base import AbstractBRDF
+from fitmat.brdf.noisy import Noisy
 from fitmat.brdf.tilt import Tilted
 from fitmat.geometry import COS_MIN, above
 from fitmat.instrument import Instrument
@@ -91,7 +92,7 @@ class Seen(AbstractBRDF):
 
 def surface(model: AbstractBRDF) -> AbstractBRDF:
     """The material itself: without what the instrument and the mount do to its measurement."""
-    while isinstance(model, Seen | Tilted):
+    while isinstance(model, Noisy | Seen | Tilted):
         model = model.base
     return model
 

@@ -17,10 +17,10 @@ from fitmat.examination.coverage import Coverage, coverage, mirror_frame
 from fitmat.examination.features import Level, Peak, Tilt, level, peak, tilt
 from fitmat.examination.implied_albedo import ImpliedAlbedo, implied_albedo
 from fitmat.examination.phrases import Said
-from fitmat.examination.prospects import ASSUMED, Prospect, noise_law, prospects
+from fitmat.examination.prospects import ASSUMED, Prospect, prospects
 from fitmat.examination.value_range import ValueRange, value_range
 from fitmat.measurement import Measurements
-from fitmat.noise import Noise, measured_noise
+from fitmat.noise import Noise, measured_noise, noise_law
 
 MOST_ESTIMATED = 100_000
 """Rows times channels above which a noise that the file does not give is not estimated from neighbours."""

@@ -11,11 +11,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from scipy.optimize import nnls
 
 from fitmat.brdf import AbstractBRDF, evaluate_pairs, model
 from fitmat.information import UNDETERMINED, inverse_information
 from fitmat.measurement import Measurements
+from fitmat.noise import noise_law
 from fitmat.params import entries, space, vector, with_vector
 
 ROWS = 2048
@@ -92,17 +92,6 @@ def prospects(m: Measurements, sigma: Float[np.ndarray, "n c"], *, known: bool) 
             truth = model(name, channels=1, **values)
             found += _verdicts(truth, gloss, np.asarray(_information(truth, *arrays)))
     return tuple(found)
-
-
-def noise_law(value: Float[np.ndarray, " n"], sigma: Float[np.ndarray, " n"]) -> tuple[float, float]:
-    """a (sr⁻¹) and b of σ² = a² + (b f)² by non-negative least squares on relative residuals; a is never 0."""
-    unit = float(sigma.max())
-    value, sigma = value / unit, sigma / unit
-    squares = np.stack([np.ones_like(value), value**2], axis=1) / sigma[:, None] ** 2
-    scale = np.abs(squares).max(axis=0) + 1e-300
-    (a2, b2), _ = nnls(squares / scale, np.ones_like(value)) if len(value) > 1 else ((sigma[0] ** 2 * scale[0], 0.0), 0)
-    lowest = 1e-3 * float(sigma.min())
-    return unit * float(max(np.sqrt(a2 / scale[0]), lowest)), float(np.sqrt(b2 / scale[1]))
 
 
 @eqx.filter_jit

@@ -1,0 +1,149 @@
+"""Priors: what is believed of a model's parameters before the data, as given, as the likelihood needs it, and as draws.
+
+It sees no data. Without a word of the user a parameter is as likely anywhere within its bounds: in the logarithm where
+its scale is log (alpha, exponent, eta, kappa, f0), else linearly; the discrepancy s ≥ 0 likewise. A stated prior is
+a Gaussian in the same coordinate, cut off at the bounds: a log-normal of that median and that relative sd where the
+scale is log. A shared scale g has ln g ~ N(0, calibration²).
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import ArrayLike, Float
+from scipy.stats import truncnorm
+
+from fitmat.brdf import AbstractBRDF
+from fitmat.display import with_error
+from fitmat.errors import ModelError
+from fitmat.instrument import Instrument
+from fitmat.likelihood import Prior
+from fitmat.params import Entry, entries, space, vector
+
+DISCREPANCY = "discrepancy"
+"""Name under which s has a prior: centre 0, and the sd of a Gaussian of which s is the size (half-normal)."""
+
+
+def prepared(
+    model: AbstractBRDF, instrument: Instrument, given: Mapping[str, tuple[ArrayLike, ArrayLike]]
+) -> Prior | None:
+    """Stated priors, and the calibration's, in natural coordinates; None where everything is flat.
+
+    Args:
+        model: Gives the parameters.
+        instrument: Gives the prior of the shared scale.
+        given: Parameter name → centre and sd in physical units, each one number or one per channel.
+
+    Raises:
+        ModelError: a name is not a parameter's, a centre lies outside its bounds, an sd is not positive.
+    """
+    coordinates, places = space(model), {e.name: e for e in entries(model)}
+    mean, precision = np.zeros(len(vector(model))), np.zeros(len(vector(model)))
+    discrepancy = 0.0
+    if instrument.calibration:
+        precision[places["scale"].place] = 1.0 / instrument.calibration
+    for name, (centre, sd) in given.items():
+        if name == DISCREPANCY:
+            discrepancy = 1.0 / _positive(name, sd).item()
+            continue
+        if name not in places:
+            raise ModelError(f"prior of {name!r}: {model.name} has {', '.join(places)}; also {DISCREPANCY}.")
+        entry = places[name]
+        middle, spread = _inside(entry, centre), _positive(name, sd)
+        log = coordinates.log[entry.place]
+        mean[entry.place] = np.where(log, np.log(np.where(log, middle, 1.0)), middle)
+        precision[entry.place] = np.where(log, middle, 1.0) / spread
+    if not precision.any() and not discrepancy:
+        return None
+    return Prior(jnp.asarray(mean), jnp.asarray(precision), jnp.asarray(discrepancy))
+
+
+def _inside(entry: Entry, centre: ArrayLike) -> np.ndarray:
+    middle = np.atleast_1d(np.asarray(centre, float))
+    if middle.size not in (1, entry.size):
+        raise ModelError(f"prior of {entry.name}: {middle.size} centres, expected 1 or {entry.size}.")
+    lower, upper = entry.param.lower, entry.param.upper
+    if not ((middle >= lower) & (middle <= upper)).all():
+        raise ModelError(f"prior of {entry.name}: centre {middle}, expected a value from {lower:g} to {upper:g}.")
+    return middle
+
+
+def _positive(name: str, sd: ArrayLike) -> np.ndarray:
+    spread = np.atleast_1d(np.asarray(sd, float))
+    if not (np.isfinite(spread) & (spread > 0)).all():
+        raise ModelError(f"prior of {name}: standard deviation {spread}, expected a positive number.")
+    return spread
+
+
+def assignments(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """`NAME=CENTRE,SD` texts as the argument `priors` of `fit`.
+
+    Raises:
+        ModelError: a text is not of that form.
+    """
+    found = {}
+    for text in texts:
+        name, _, values = text.partition("=")
+        try:
+            centre, sd = (float(v) for v in values.split(","))
+        except ValueError as error:
+            raise ModelError(f"--prior {text!r}: expected NAME=CENTRE,SD, for example eta=1.5,0.05.") from error
+        found[name.strip()] = (centre, sd)
+    return found
+
+
+def natural_sd(model: AbstractBRDF, prior: Prior | None) -> Float[np.ndarray, " p"]:
+    """Prior standard deviation of every natural coordinate; that of a flat prior is its range / √12."""
+    coordinates = space(model)
+    flat = (coordinates.natural_upper - coordinates.natural_lower) / np.sqrt(12.0)
+    if prior is None:
+        return flat
+    precision = np.asarray(prior.precision)
+    return np.where(precision > 0, np.minimum(1.0 / np.where(precision > 0, precision, 1.0), flat), flat)
+
+
+def draw(
+    model: AbstractBRDF, prior: Prior | None, free: np.ndarray, count: int, rng: np.random.Generator
+) -> tuple[Float[np.ndarray, "count p"], Float[np.ndarray, " count"]]:
+    """Parameter vectors (physical) and discrepancies from the prior; parameters that are not free as in the model.
+
+    Raises:
+        ModelError: s has a flat prior, from which nothing can be drawn.
+    """
+    if prior is None or not float(prior.discrepancy) > 0:
+        raise ModelError(f"cannot draw from a flat prior of {DISCREPANCY}: state one, for example (0, 0.01).")
+    coordinates = space(model)
+    low, high = coordinates.natural_lower, coordinates.natural_upper
+    precision = np.asarray(prior.precision)
+    sd = np.where(precision > 0, 1.0 / np.where(precision > 0, precision, 1.0), 1.0)
+    a, b = (low - np.asarray(prior.mean)) / sd, (high - np.asarray(prior.mean)) / sd
+    u = rng.random((count, len(low)))
+    gaussian = np.asarray(prior.mean) + sd * truncnorm.ppf(u, a, b)
+    natural = np.where(precision > 0, gaussian, low + u * (high - low))
+    physical = np.where(coordinates.log, np.exp(np.where(coordinates.log, natural, 0.0)), natural)
+    values = np.tile(np.asarray(vector(model)), (count, 1))
+    values[:, free] = physical[:, free]
+    return values, np.abs(rng.standard_normal(count)) / float(prior.discrepancy)
+
+
+def words(model: AbstractBRDF, prior: Prior | None) -> dict[str, tuple[str, ...]]:
+    """The prior of every parameter as text, one for each channel: "1.50 ± 0.05", or "0.0001 – 1, any magnitude"."""
+    coordinates, found = space(model), {}
+    for entry in entries(model):
+        texts = []
+        for k in range(entry.place.start, entry.place.stop):
+            stated = prior is not None and float(prior.precision[k]) > 0
+            texts.append(_stated(prior, coordinates.log[k], k) if stated else _flat(entry))
+        found[entry.name] = tuple(texts)
+    return found
+
+
+def _flat(entry: Entry) -> str:
+    p = entry.param
+    return f"{p.lower:g} – {p.upper:g}{', in the logarithm' if p.scale == 'log' else ''}"
+
+
+def _stated(prior: Any, log: bool, k: int) -> str:
+    mean, sd = float(prior.mean[k]), 1.0 / float(prior.precision[k])
+    return with_error(np.exp(mean), np.exp(mean) * sd) if log else with_error(mean, sd)
