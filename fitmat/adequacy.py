@@ -11,7 +11,7 @@ from jaxtyping import Float
 from scipy.stats import norm
 
 from fitmat.geometry import signed_zenith
-from fitmat.information import FOLLOWS, MISSES
+from fitmat.information import MISSES
 from fitmat.losses import bad_probability
 from fitmat.noise import leave_one_out
 from fitmat.outcome import Fit
@@ -68,14 +68,15 @@ def doubted(fit: Fit) -> Doubts:
     if not fit.finite:
         return Doubts((f"{fit.name} {fit.adequacy}.",), True)
     clashes, identical = _contradictions(fit), _identical(fit)
-    noise = _doubtful_noise(fit)
+    noise = [] if identical else _doubtful_noise(fit)
     missed = fit.noise.known and fit.misfit_ratio >= MISSES
     words = [*identical, *clashes, *noise, *_bad_values(fit, clashes)]
     if missed:
-        words.insert(0, f"{fit.name} is inadequate: it {fit.adequacy}; {_pattern(fit)}.")
+        ratio = f"{fit.misfit_ratio:.2g} × the measurement noise"
+        words.insert(0, f"{fit.name} is inadequate: it misses the data by {ratio}; {_pattern(fit)}.")
     elif not fit.noise.known:
         words.append(f"Whether {fit.name} is adequate cannot be judged: the noise is not known.")
-    inadequate = bool(missed or clashes or noise or identical)
+    inadequate = bool(missed or noise or identical or (clashes and not fit.loss.robust))
     if inadequate:
         words.append("The intervals hold only if the model and the noise are right, which these data contradict.")
     return Doubts(tuple(words), inadequate)
@@ -112,10 +113,12 @@ def _contradictions(fit: Fit) -> list[str]:
             where = int(a[at]), int(b[at])
     if pairs == 0 or worst <= norm.isf(CHANCE / (2 * pairs)):
         return []
+    give = "the wrong one little weight."
+    advice = f"The loss {fit.loss.name} gives {give}" if fit.loss.robust else f"--loss student-t gives {give}"
     theta_i, theta_o = (np.rad2deg(part[where[0]]) for part in (m.theta_i, m.signed_theta_o))
     return [
         f"Two measurements of one geometry (θᵢ {theta_i:.4g}°, θₒ {theta_o:.4g}°) differ by {worst:.3g} times their "
-        "noise: no model can follow both. Remove the wrong one, or use --loss student-t or --loss mixture."
+        f"noise: no model can follow both. {advice}"
     ]
 
 
@@ -173,7 +176,7 @@ def _bad_values(fit: Fit, clashes: list[str]) -> list[str]:
         bad = np.abs(z) > norm.isf(CHANCE / (2 * max(fit.n_values, 1)))
         limit = "further from it than noise and misfit explain"
     count = int(np.count_nonzero(bad))
-    if count == 0 or clashes or (fit.misfit_ratio >= FOLLOWS and not fit.loss.robust):
+    if count == 0 or clashes or (fit.misfit_ratio >= MISSES and not fit.loss.robust):
         return []
     row = int(np.abs(z).max(axis=1).argmax())
     wi, wo = np.asarray(fit.data.wi)[row], np.asarray(fit.data.wo)[row]

@@ -75,31 +75,36 @@ def fit(
     seed: options.Seed = 0,
     fix: options.Fix = None,
     masking: options.Masking = None,
+    loss: options.Loss = "default",
+    prior: options.Prior = None,
+    check_posterior: options.CheckPosterior = False,
     ior: options.Ior = None,
     tilt: options.Tilt = False,
 ) -> None:
     """Fit models to a file of measurements and write a report with the Phong–microfacet match."""
     _setup()
-    from fitmat import conditions, console, folder, report
+    from fitmat import conditions, console, folder, priors, report
     from fitmat.measurement import Measurements
     from fitmat.params import assignments
 
-    names, fixed = console.model_names(models), assignments(fix or [], "--fix")
+    fixed, believed = assignments(fix or [], "--fix"), priors.assignments(prior or [])
     measurements = console.source(file, reading | {"instrument": instrument})
     shown = measurements if isinstance(measurements, Measurements) else measurements.part
-    known = conditions.prepared(names, shown, ior=ior, tilt=tilt)
+    known = conditions.prepared(console.model_names(models, shown), shown, ior=ior, tilt=tilt)
     target = out or folder.default(file)
     with folder.new(target, force=force, stale=report.POSTERIOR.format("*")) as draft:
         _leave_on_interrupt(draft)
-        posteriors, match = console.study(
-            measurements, known, fixed=fixed, masking=masking, sampling=not no_mcmc, seed=seed
+        plan = console.Plan(
+            known, fixed, believed, loss, masking, not no_mcmc, seed, check_posterior, folder.resumed(target)
         )
-        report.write(draft, posteriors, match)
+        found = console.study(measurements, plan)
+        report.write(draft, found)
+    folder.discard(folder.resumed(target))
     if json_:
         sys.stdout.write((target / "fit.json").read_text(encoding="utf-8"))
     else:
-        console.show(posteriors, match, target)
-    if any(p.fit.result != "converged" or p.interrupted for p in posteriors):
+        console.show(found, target)
+    if any(p.fit.result != "converged" or p.interrupted for p in found.posteriors):
         raise typer.Exit(NOT_CONVERGED)
 
 
@@ -206,6 +211,14 @@ def models(
         manual.list_models()
     else:
         manual.page(name)
+
+
+@app.command()
+def losses() -> None:
+    """List what a fit can minimise, by name: the default, other likelihoods, and the objectives of the literature."""
+    from fitmat import manual
+
+    manual.list_losses()
 
 
 def main() -> None:

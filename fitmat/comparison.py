@@ -4,50 +4,47 @@ Judges two fits; draws nothing and prints nothing.
 """
 
 import dataclasses
+import functools
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from fitmat.brdf import LOBES, AbstractBRDF, lobe_names, surface
+from fitmat import headline
+from fitmat.ablation import Ablation, ablate
+from fitmat.brdf import LOBES, lobe_names
+from fitmat.conversion import alpha_from_exponent, exponent_from_alpha
+from fitmat.distances import ANGLES, Distances, Values, measure_distances
 from fitmat.errors import FitmatError
+from fitmat.estimate import Estimate, band, estimate
+from fitmat.headline import CLOSE as CLOSE
+from fitmat.headline import SIMILAR as SIMILAR
+from fitmat.headline import STRONG_EVIDENCE as STRONG_EVIDENCE
+from fitmat.imitation import Imitation, imitate
 from fitmat.measurement import Measurements
-from fitmat.params import with_vector
+from fitmat.outcome import Fit
 from fitmat.posterior import Posterior
-from fitmat.quadrature import incidence_rule, lobe_rule
+from fitmat.telling import Telling, tell_apart
 
-DRAWS = 200
+if TYPE_CHECKING:
+    from fitmat.sphere import Perceived
+
+DRAWS = 100
 """Posterior draws behind every interval of the match."""
 
-ALBEDO_ANGLES = np.deg2rad(np.arange(0.0, 86.0, 5.0))
+FEW_DRAWS = 50
+"""Draws behind the intervals of what is costlier: ablation and the predictive difference."""
+
+ALBEDO_ANGLES = ANGLES
 """Incidence angles of the albedo curves, radians."""
-
-AZIMUTHS = 4
-"""Azimuths of incidence over half a turn, where a model is anisotropic."""
-
-CLOSE, SIMILAR = 0.1, 0.3
-"""Hemisphere distances up to which the verdict says "hardly differ" and "differ moderately"."""
 
 ALBEDO_ERROR = 2e-3
 """Albedos above 1 by more than the quadrature's error are called impossible."""
 
-STRONG_EVIDENCE = 10.0
-"""ΔBIC from which the data clearly prefer one model (Kass & Raftery 1995: "very strong")."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Estimate:
-    """A number with its 95 % posterior interval.
-
-    Attributes:
-        value: At the two best fits.
-        ci95: 2.5 % and 97.5 % quantiles over posterior draws.
-    """
-
-    value: float
-    ci95: tuple[float, float]
+IMITATED = ("relative", "ngan", "cube-root", "log-ratio")
+"""Metrics in which each fitted model is imitated by the other."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -65,11 +62,18 @@ class Comparison:
         albedo_gap_theta_i_deg: Where it occurs.
         implied_exponent: 2/α² − 2 of the microfacet lobe; None for lobes without alpha.
         fitted_exponent: Of the empirical lobe; None for lobes without exponent.
+        implied_alpha: √(2/(n+2)) of the empirical lobe; None for lobes without exponent.
+        fitted_alpha: Of the microfacet lobe; None for lobes without alpha.
+        width_ratio: Implied over fitted alpha: how much wider the empirical lobe is; None where one of them is.
         delta_aicc: AICc of the empirical minus that of the microfacet fit; positive favours microfacet.
         delta_bic: The same for BIC.
         albedo_theta_i: Angles of the albedo curves, radians, (k,).
         albedo_empirical: Channel-mean directional albedo, rows low, best, high (95 %), (3, k).
         albedo_microfacet: The same.
+        distances: Every metric, over the hemisphere, by incidence and by region.
+        ablation: Which terms of the microfacet lobe make the difference; None for lobes that have not these terms.
+        telling: The difference against the noise of the instrument.
+        perceived: What an eye sees of the difference on a sphere; None where it was not asked for.
     """
 
     empirical: Posterior
@@ -82,47 +86,58 @@ class Comparison:
     albedo_gap_theta_i_deg: float
     implied_exponent: Estimate | None
     fitted_exponent: Estimate | None
+    implied_alpha: Estimate | None
+    fitted_alpha: Estimate | None
+    width_ratio: Estimate | None
     delta_aicc: float
     delta_bic: float
     albedo_theta_i: np.ndarray
     albedo_empirical: Float[np.ndarray, "3 k"]
     albedo_microfacet: Float[np.ndarray, "3 k"]
+    distances: Distances
+    ablation: Ablation | None
+    telling: Telling
+    perceived: "Perceived | None"
 
     @property
     def verdict(self) -> str:
-        """The match in plain sentences; thresholds are `CLOSE`, `SIMILAR` and `STRONG_EVIDENCE`."""
+        """The match in plain sentences; the thresholds are those of `headline`, `telling`, `ablation` and `sphere`."""
         names = _lobe_title(self.empirical.fit.name), _lobe_title(self.microfacet.fit.name)
-        distance = self.hemisphere_distance
-        word = (
-            "hardly differ"
-            if distance.ci95[1] < CLOSE
-            else "differ moderately"
-            if distance.ci95[1] < SIMILAR
-            else "differ strongly"
-        )
-        low, high = (100 * x for x in distance.ci95)
-        gap, side = self.albedo_gap_max, "less" if self.albedo_gap_sign < 0 else "more"
-        sentences = [
-            f"{names[0]} and {names[1]} {word}: {100 * distance.value:.0f} % apart over the hemisphere "
-            f"(95 % interval {low:.0f}–{high:.0f} %).",
-            f"At {self.albedo_gap_theta_i_deg:.0f}° incidence {names[0]} reflects {100 * gap.value:.1f} % of the light "
-            f"{side} than {names[1]} ({100 * gap.ci95[0]:.1f}–{100 * gap.ci95[1]:.1f} %).",
-            _evidence(self.delta_bic, names),
+        found = [
+            headline.distance_sentence(names, self.hemisphere_distance),
+            headline.telling_sentence(names, self.telling),
+            headline.grazing_sentence(names, self.distances.grazing_excess, self.ablation),
+            headline.gap_sentence(names, self.albedo_gap_max, self.albedo_gap_sign, self.albedo_gap_theta_i_deg),
+            None if self.perceived is None else self.perceived.words,
+            headline.evidence_sentence(names, self.delta_bic),
             f"{names[0]} {self.empirical.fit.adequacy}; {names[1]} {self.microfacet.fit.adequacy}.",
         ]
+        return " ".join([sentence for sentence in found if sentence] + self._cautions(names))
+
+    def _cautions(self, names: tuple[str, str]) -> list[str]:
+        """What is impossible, undetermined or unfinished."""
+        sentences = []
         for name, albedo in zip(names, (self.albedo_empirical[1], self.albedo_microfacet[1]), strict=True):
             if albedo.max() > 1.0 + ALBEDO_ERROR:
                 at = np.rad2deg(self.albedo_theta_i[np.argmax(albedo)])
                 sentences.append(
                     f"{name} reflects more light than it receives (albedo {albedo.max():.2f} at {at:.0f}°)."
                 )
-        for fit in (self.empirical.fit, self.microfacet.fit):
+        fits = self.empirical.fit, self.microfacet.fit
+        for fit in fits:
             if fit.undetermined:
                 loose = " and ".join(fit.undetermined)
                 sentences.append(f"{fit.name} leaves {loose} undetermined: trust the intervals, not the values.")
-        unsure = [p.fit for p in (self.empirical, self.microfacet) if p.fit.result in ("max_steps", "nonfinite")]
-        sentences += [f"Do not rely on this match: the fit of {f.name} ended {f.result}." for f in unsure]
-        return " ".join(sentences)
+        unsure = [fit for fit in fits if fit.result in ("max_steps", "nonfinite")]
+        return sentences + [f"Do not rely on this match: the fit of {f.name} ended {f.result}." for f in unsure]
+
+    @functools.cached_property
+    def imitations(self) -> tuple[Imitation, ...]:
+        """The empirical model closest to the fitted microfacet model and the other way round, in each of `IMITATED`."""
+        fits = self.empirical.fit, self.microfacet.fit
+        with ThreadPoolExecutor() as pool:
+            both = pool.map(lambda k: [imitate(fits[1 - k], fits[k].model, metric) for metric in IMITATED], (0, 1))
+        return tuple(found for each in both for found in each)
 
     def _repr_html_(self) -> str:
         return f"<p>{self.verdict}</p>"
@@ -130,12 +145,6 @@ class Comparison:
 
 def _lobe_title(name: str) -> str:
     return name.removeprefix("lambert+")
-
-
-def _evidence(delta_bic: float, names: tuple[str, str]) -> str:
-    if abs(delta_bic) < STRONG_EVIDENCE:
-        return f"The data do not decide between them (ΔBIC {delta_bic:.0f})."
-    return f"The data clearly prefer {names[1] if delta_bic > 0 else names[0]} (ΔBIC {abs(delta_bic):.0f})."
 
 
 def is_empirical(name: str) -> bool:
@@ -148,12 +157,13 @@ def is_microfacet(name: str) -> bool:
     return any(LOBES[part].kind == "microfacet" for part in lobe_names(name))
 
 
-def compare(one: Posterior, other: Posterior) -> Comparison:
+def compare(one: Posterior, other: Posterior, *, spheres: bool = True) -> Comparison:
     """The match between an empirical and a microfacet model, in either order.
 
     Args:
         one: Posterior (`laplace` or `sample`) of a fit.
         other: Posterior of the other fit to the same measurements.
+        spheres: Whether to ask what an eye would see of the difference, the slowest part.
 
     Returns:
         A `Comparison`; intervals come from independent draws of both posteriors.
@@ -163,42 +173,76 @@ def compare(one: Posterior, other: Posterior) -> Comparison:
             finite.
     """
     empirical, microfacet = (one, other) if is_empirical(one.fit.name) else (other, one)
-    if not (is_empirical(empirical.fit.name) and is_microfacet(microfacet.fit.name)):
+    _refuse_unlike(empirical, microfacet)
+    fits, models = (empirical.fit, microfacet.fit), (empirical.fit.model, microfacet.fit.model)
+    values = _paired(empirical, microfacet)
+    few = values[0][: FEW_DRAWS + 1], values[1][: FEW_DRAWS + 1]
+    with ThreadPoolExecutor() as pool:
+        measuring = pool.submit(measure_distances, *models, values=values, measured=_incidences(fits[0].measurements))
+        ablating = pool.submit(ablate, *models, values=few)
+        telling = pool.submit(tell_apart, *fits, values=few)
+        seeing = pool.submit(_perceived, *fits, values=values) if spheres else None
+    parts = {"ablation": ablating.result(), "telling": telling.result(), "perceived": seeing and seeing.result()}
+    return _concluded((empirical, microfacet), measuring.result(), **parts)
+
+
+def _refuse_unlike(empirical: Posterior, microfacet: Posterior) -> None:
+    one, other = empirical.fit, microfacet.fit
+    if not (is_empirical(one.name) and is_microfacet(other.name)):
         known = ", ".join(name for name, lobe in LOBES.items() if lobe.kind == "empirical")
         raise FitmatError(
-            f"compare needs one empirical ({known}) and one microfacet model, got {one.fit.name} and {other.fit.name}."
+            f"compare needs one empirical ({known}) and one microfacet model, got {one.name} and {other.name}."
         )
-    for fit in (one.fit, other.fit):
+    for fit in (one, other):
         if not fit.finite:
             raise FitmatError(f"{fit.name}: the fit ended {fit.result}, there is nothing to compare; check the data.")
-    if one.fit.measurements is not other.fit.measurements:
+    if one.measurements is not other.measurements:
         raise FitmatError("compare needs two fits to the same Measurements object.")
-    fits = empirical.fit, microfacet.fit
-    draws = [np.vstack([p.fit.values, _by_scale(p)]) for p in (empirical, microfacet)]
-    count = min(len(d) for d in draws)
-    angles = jnp.asarray(_incidences(fits[0].measurements))
-    pairs = jnp.asarray(draws[0][:count]), jnp.asarray(draws[1][:count])
-    computed = _distances(fits[0].model, fits[1].model, pairs, angles)
-    hemisphere, measured, cube, albedo_p, albedo_m = (np.asarray(part) for part in computed)
-    gaps = albedo_p - albedo_m
+
+
+def _concluded(pair: tuple[Posterior, Posterior], found: Distances, **parts: Any) -> Comparison:
+    """The match from what was measured."""
+    empirical, microfacet = pair
+    gaps = found.albedos[0] - found.albedos[1]
     worst = int(np.argmax(np.abs(gaps[0])))
+    n, alpha = _draws_of(empirical, "exponent"), _draws_of(microfacet, "alpha")
+    width = None if n is None else alpha_from_exponent(n)
     return Comparison(
         empirical=empirical,
         microfacet=microfacet,
-        hemisphere_distance=_estimate(hemisphere),
-        measured_distance=_estimate(measured),
-        cube_root_distance=_estimate(cube),
-        albedo_gap_max=_estimate(np.abs(gaps).max(axis=1)),
+        hemisphere_distance=found.whole["relative"],
+        measured_distance=found.measured,
+        cube_root_distance=found.whole["cube-root"],
+        albedo_gap_max=estimate(np.abs(gaps).max(axis=1)),
         albedo_gap_sign=int(np.sign(gaps[0, worst])) or 1,
         albedo_gap_theta_i_deg=float(np.rad2deg(ALBEDO_ANGLES[worst])),
-        implied_exponent=_parameter(microfacet, "alpha", lambda alpha: 2.0 / alpha**2 - 2.0),
-        fitted_exponent=_parameter(empirical, "exponent", lambda n: n),
-        delta_aicc=fits[0].aicc - fits[1].aicc,
-        delta_bic=fits[0].bic - fits[1].bic,
+        implied_exponent=None if alpha is None else estimate(exponent_from_alpha(alpha)),
+        fitted_exponent=None if n is None else estimate(n),
+        implied_alpha=None if width is None else estimate(width),
+        fitted_alpha=None if alpha is None else estimate(alpha),
+        width_ratio=None if width is None or alpha is None else estimate(_ratio(width, alpha)),
+        delta_aicc=empirical.fit.aicc - microfacet.fit.aicc,
+        delta_bic=empirical.fit.bic - microfacet.fit.bic,
         albedo_theta_i=ALBEDO_ANGLES,
-        albedo_empirical=_band(albedo_p),
-        albedo_microfacet=_band(albedo_m),
+        albedo_empirical=band(found.albedos[0]),
+        albedo_microfacet=band(found.albedos[1]),
+        distances=found,
+        **parts,
     )
+
+
+def _perceived(empirical: Fit, microfacet: Fit, values: Values) -> "Perceived":
+    from fitmat.sphere import perceived  # loads colour-science
+
+    vectors = jnp.asarray(values[0]), jnp.asarray(values[1])
+    return perceived(empirical.model, microfacet.model, vectors, empirical.measurements.channels)
+
+
+def _paired(empirical: Posterior, microfacet: Posterior) -> Values:
+    """Parameter vectors of both: the best fits, then draws in pairs, in no particular order."""
+    one, other = _by_scale(empirical), _by_scale(microfacet)
+    mixed = np.random.default_rng(0).permutation(min(len(one), len(other)))
+    return np.vstack([empirical.fit.values, one[mixed]]), np.vstack([microfacet.fit.values, other[mixed]])
 
 
 def _by_scale(posterior: Posterior) -> np.ndarray:
@@ -208,65 +252,18 @@ def _by_scale(posterior: Posterior) -> np.ndarray:
     return values if place is None else values[np.argsort(values[:, place.start])]
 
 
-def _estimate(values: np.ndarray) -> Estimate:
-    """The first entry with the quantiles of the others."""
-    low, high = np.quantile(values[1:], [0.025, 0.975])
-    return Estimate(float(values[0]), (float(low), float(high)))
-
-
-def _band(curves: np.ndarray) -> np.ndarray:
-    low, high = np.quantile(curves[1:], [0.025, 0.975], axis=0)
-    return np.stack([low, curves[0], high])
-
-
-def _parameter(posterior: Posterior, name: str, of) -> Estimate | None:
+def _draws_of(posterior: Posterior, name: str) -> np.ndarray | None:
+    """The best value and every draw of a parameter; None where the model has it not."""
     place = next((e.place for e in posterior.fit.entries if e.name == name), None)
-    if place is None:
-        return None
-    return _estimate(of(np.r_[posterior.fit.values[place], posterior.values[:, place].ravel()]))
+    return None if place is None else np.r_[posterior.fit.values[place], posterior.values[:, place].ravel()]
+
+
+def _ratio(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    count = min(len(one), len(other))
+    return one[:count] / other[:count]
 
 
 def _incidences(m: Measurements) -> np.ndarray:
     """At most 16 of the measured incidence angles in radians, evenly spread."""
     angles = np.unique(np.round(m.theta_i[m.valid.any(axis=1)], 4))
     return angles[np.unique(np.linspace(0, len(angles) - 1, 16).astype(int))]
-
-
-@eqx.filter_jit
-def _distances(
-    empirical: AbstractBRDF, microfacet: AbstractBRDF, values: tuple[Array, Array], angles: Array
-) -> tuple[Array, Array, Array, Array, Array]:
-    """Hemisphere, measured and cube-root distance (d,), and channel-mean albedos (d, k), of d pairs of draws."""
-    theta, weight = (jnp.asarray(part) for part in incidence_rule())
-    nodes = jnp.concatenate([theta, angles, jnp.asarray(ALBEDO_ANGLES)])
-    hemisphere, measured = slice(0, len(theta)), slice(len(theta), len(theta) + len(angles))
-    albedo = slice(len(theta) + len(angles), None)
-
-    isotropic = surface(empirical).isotropic and surface(microfacet).isotropic
-    turns = jnp.zeros(1) if isotropic else (jnp.arange(AZIMUTHS) + 0.5) * jnp.pi / AZIMUTHS
-
-    def at(theta_i: Array, phi_i: Array, p: AbstractBRDF, m: AbstractBRDF) -> tuple[Array, ...]:
-        """Integrals over ω_o: squared difference, square, squared root difference, solid angle, both albedos."""
-        rule = lobe_rule(theta_i, jnp.minimum(p.width(), m.width()), phi_i=None if isotropic else phi_i)
-        wi = rule.wi
-        f_p, f_m = (jax.vmap(lambda wo, f=f: jnp.atleast_1d(f(wi, wo)))(rule.wo) for f in (p, m))
-        solid = jnp.where(rule.weight > 0, rule.weight / jnp.maximum(rule.wo[:, 2], 1e-12), 0.0)
-        roots = (jnp.cbrt(f_p * wi[2]) - jnp.cbrt(f_m * wi[2])) ** 2
-        sums = rule.weight @ (f_p - f_m) ** 2, rule.weight @ f_m**2, solid @ roots, rule.weight @ f_p, rule.weight @ f_m
-        difference, square, root, one, other = (part.mean() for part in sums)
-        return difference, square, root, jnp.sum(solid), one, other
-
-    def pair(both: tuple[Array, Array]) -> tuple[Array, Array, Array, Array, Array]:
-        p, m = (surface(with_vector(f, v)) for f, v in zip((empirical, microfacet), both, strict=True))
-        every = jax.vmap(lambda turn: jax.vmap(lambda t: at(t, turn, p, m))(nodes))(turns)
-        difference, square, roots, solid, one, other = (part.mean(axis=0) for part in every)
-        flat, cosines = weight / jnp.cos(theta), jnp.cos(angles)
-        return (
-            jnp.sqrt((weight @ difference[hemisphere]) / (weight @ square[hemisphere])),
-            jnp.sqrt((cosines @ difference[measured]) / (cosines @ square[measured])),
-            jnp.sqrt((flat @ roots[hemisphere]) / (flat @ solid[hemisphere])),
-            one[albedo],
-            other[albedo],
-        )
-
-    return jax.lax.map(pair, values)

@@ -4,6 +4,8 @@ Progress goes to stderr, results to stdout; nothing is computed here.
 """
 
 import contextlib
+import dataclasses
+import shutil
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -20,16 +22,20 @@ from rich.text import Text
 from fitmat.approximation import laplace, laplace_each
 from fitmat.brdf import LOBES, lobe_names, model, normalised
 from fitmat.bulk import fit_chunks
+from fitmat.choice import every_model
 from fitmat.comparison import Comparison, compare, is_empirical, is_microfacet
 from fitmat.errors import ModelError
 from fitmat.formats import chunks, read
+from fitmat.losses import DEFAULT
 from fitmat.measurement import Measurements
-from fitmat.outcome import RESULTS
+from fitmat.outcome import RESULTS, Fit
 from fitmat.params import entries
 from fitmat.posterior import Posterior
+from fitmat.priors import DISCREPANCY
 from fitmat.report import rows
 from fitmat.rows import Rows, held
-from fitmat.uncertainty import sample
+from fitmat.study import Study, concluded, detailed
+from fitmat.uncertainty import resumable_steps, sample
 
 MOST_AT_ONCE = 100_000
 """Rows above which a fit passes over the data block by block."""
@@ -38,8 +44,17 @@ MOST_SAMPLED = 50_000
 """Values above which nothing is sampled: a step takes seconds, and Laplace's approximation is as good."""
 
 
-def model_names(text: str) -> list[str]:
-    """A comma-separated list of model names, checked, without repeats."""
+EVERY = "all"
+"""Asks for every model that makes sense for the measurements."""
+
+MOST_LISTED = 4
+"""More models than this are counted on the screen, not listed."""
+
+
+def model_names(text: str, measurements: Measurements | None = None) -> list[str]:
+    """A comma-separated list of model names, checked, without repeats; "all" for what can be told by measurements."""
+    if text.strip() == EVERY:
+        return list(every_model(measurements))
     names = [normalised(part) for part in text.split(",") if part.strip()]
     if not names:
         raise ModelError("no model given; try --models lambert+blinn-phong,lambert+ggx.")
@@ -59,45 +74,78 @@ def source(file: Path, reading: Mapping[str, Any]) -> Measurements | Rows:
     return held(measurements) if measurements.n_samples > MOST_AT_ONCE else measurements
 
 
-def study(
-    measurements: Measurements | Rows,
-    known: Mapping[str, Mapping[str, np.ndarray]],
-    *,
-    fixed: Mapping[str, np.ndarray],
-    masking: str | None,
-    sampling: bool,
-    seed: int,
-) -> tuple[list[Posterior], Comparison | None]:
-    """Fit, sample and compare, with a progress bar on stderr.
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """How measurements are studied.
+
+    Attributes:
+        known: Model name → parameters that are known of it beforehand (`conditions.prepared`).
+        fixed: Parameters to hold in every model that has them; at least one must.
+        priors: What is known beforehand, in every model that has the parameter; at least one must.
+        loss: What the fits minimise, by name.
+        masking: Of the microfacet lobes; None for the models' own.
+        sampling: Whether to sample; else, and for more than `MOST_SAMPLED` values, Laplace's approximation.
+        seed: Of the sampling.
+        second_opinion: Whether to sample a second time with another method.
+        resume: Folder in which the sampling is kept while it lasts; None to keep nothing.
+    """
+
+    known: Mapping[str, Mapping[str, np.ndarray]]
+    fixed: Mapping[str, np.ndarray] = dataclasses.field(default_factory=dict)
+    priors: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
+    loss: str = DEFAULT.name
+    masking: str | None = None
+    sampling: bool = True
+    seed: int = 0
+    second_opinion: bool = False
+    resume: Path | None = None
+
+
+def study(measurements: Measurements | Rows, plan: Plan) -> Study:
+    """Fit, sample, compare and examine, with a progress bar on stderr.
 
     Args:
         measurements: What to fit; `Rows` are passed over, and models fitted one after the other.
-        known: Model name → parameters that are known of it beforehand (`conditions.prepared`).
-        fixed: Parameters to hold in every model that has them; at least one must.
-        masking: The same for the masking.
-        sampling: Whether to sample; else, and for more than `MOST_SAMPLED` values, Laplace's approximation.
-        seed: Of the sampling.
+        plan: How.
 
     An interrupt during sampling keeps what was done and leaves the remaining models to Laplace's approximation.
     """
-    jobs = {name: _options(name, known, fixed, masking) for name in known}
+    jobs = {name: _options(name, plan) for name in plan.known}
     with _bar() as bar:
-        if isinstance(measurements, Measurements):
-            fitting = bar.add_task(f"fitting {', '.join(jobs)}", total=None)
-            first = laplace_each(measurements, jobs, seed=seed)
-            bar.update(fitting, total=1, completed=1)
-        else:
-            first = [
-                laplace(fit_chunks(measurements, name, **job, progress=_passes(bar, f"fitting {name}")), seed=seed)
-                for name, job in jobs.items()
-            ]
+        first = _fitted(measurements, jobs, bar, plan)
+        walking = plan.sampling and first[0].fit.loss.posterior and first[0].fit.n_values <= MOST_SAMPLED
         with ThreadPoolExecutor(1) as pool:
             # The match of the approximations: the answer without sampling, and compiled for the one with it.
-            match = pool.submit(_match, first)
-            few = first[0].fit.n_values <= MOST_SAMPLED
-            posteriors = _sampled(first, bar, seed) if sampling and few else first
-            bar.add_task("comparing", total=None)
-            return posteriors, match.result() if posteriors == first else _match(posteriors)
+            early = pool.submit(_match, first)
+            posteriors = _sampled(first, bar, plan) if walking else first
+            last = bar.add_task("comparing", total=None)
+            match = early.result() if posteriors == first else _match(posteriors)
+        return concluded(
+            posteriors,
+            match,
+            seed=plan.seed,
+            second_opinion=plan.second_opinion,
+            progress=lambda words: bar.update(last, description=words),
+        )
+
+
+def _fitted(
+    measurements: Measurements | Rows, jobs: Mapping[str, Mapping[str, Any]], bar: Progress, plan: Plan
+) -> list[Posterior]:
+    """Every model fitted, with Laplace's approximation."""
+    if isinstance(measurements, Measurements):
+        listed = ", ".join(jobs) if len(jobs) <= MOST_LISTED else f"{len(jobs)} models"
+        fitting = bar.add_task(f"fitting {listed}", total=None)
+        first = laplace_each(measurements, jobs, seed=plan.seed, corrected=not plan.sampling)
+        bar.update(fitting, total=1, completed=1)
+        return first
+    if plan.loss != DEFAULT.name:
+        raise ModelError(f"--loss {plan.loss}: more than {MOST_AT_ONCE:,} rows are fitted under the default loss only.")
+    every = {name: {k: v for k, v in job.items() if k != "loss"} for name, job in jobs.items()}
+    return [
+        laplace(fit_chunks(measurements, name, **job, progress=_passes(bar, f"fitting {name}")), seed=plan.seed)
+        for name, job in every.items()
+    ]
 
 
 def _bar() -> Progress:
@@ -115,13 +163,14 @@ def _passes(bar: Progress, what: str) -> Callable[[str, int, int], None]:
     )
 
 
-def _sampled(first: Sequence[Posterior], bar: Progress, seed: int) -> list[Posterior]:
+def _sampled(first: Sequence[Posterior], bar: Progress, plan: Plan) -> list[Posterior]:
     """Sample one fit after the other; after an interrupt, and for fits that are not finite, Laplace's draws stay."""
     posteriors: list[Posterior] = []
     for approximate in first:
         if not approximate.fit.finite or any(posterior.interrupted for posterior in posteriors):
             posteriors.append(approximate)
             continue
+        kept = _kept(approximate.fit, bar, plan)
         task = bar.add_task(f"sampling {approximate.fit.name}", total=None)
         with _interrupt_later() as asked:
 
@@ -130,8 +179,22 @@ def _sampled(first: Sequence[Posterior], bar: Progress, seed: int) -> list[Poste
                 if asked:
                     raise KeyboardInterrupt
 
-            posteriors.append(sample(approximate.fit, seed=seed, progress=progress))
+            posteriors.append(sample(approximate.fit, seed=plan.seed, progress=progress, checkpoint=kept))
     return posteriors
+
+
+def _kept(fit: Fit, bar: Progress, plan: Plan) -> Path | None:
+    """The folder of one model's checkpoints; those of another run make way, and what goes on is said."""
+    if plan.resume is None:
+        return None
+    folder = plan.resume / fit.name
+    if folder.exists():
+        steps = resumable_steps(fit, seed=plan.seed, checkpoint=folder)
+        if steps:
+            bar.console.print(f"Resuming {fit.name} at step {steps:,}.", highlight=False)
+        else:
+            shutil.rmtree(folder)
+    return folder
 
 
 @contextlib.contextmanager
@@ -150,25 +213,29 @@ def _interrupt_later() -> Iterator[list[int]]:
         signal.signal(signal.SIGINT, before)
 
 
-def _options(
-    name: str,
-    known: Mapping[str, Mapping[str, np.ndarray]],
-    fixed: Mapping[str, np.ndarray],
-    masking: str | None,
-) -> dict[str, Any]:
-    """What is known of this model, and what of --fix and --masking concerns it; refuses what concerns none."""
-    names, having = list(known), {n: {e.name for e in entries(model(n))} for n in known}
-    for key in fixed:
-        if not any(key in has for has in having.values()):
-            every = ", ".join(sorted(set().union(*having.values())))
-            raise ModelError(f"--fix {key}: no model of {', '.join(names)} has it; they have {every}.")
-    chosen: dict[str, Any] = {"fixed": {**known[name], **{k: v for k, v in fixed.items() if k in having[name]}}}
+def _options(name: str, plan: Plan) -> dict[str, Any]:
+    """What is known of this model, and what of --fix, --prior and --masking concerns it; refuses what concerns none."""
+    names, having = list(plan.known), {n: {e.name for e in entries(model(n))} | _BESIDE for n in plan.known}
+    for flag, given in (("--fix", plan.fixed), ("--prior", plan.priors)):
+        for key in given:
+            if not any(key in has for has in having.values()):
+                every = ", ".join(sorted(set().union(*having.values()) - _BESIDE))
+                raise ModelError(f"{flag} {key}: no model of {', '.join(names)} has it; they have {every}.")
+    chosen: dict[str, Any] = {
+        "fixed": {**plan.known[name], **{k: v for k, v in plan.fixed.items() if k in having[name] - _BESIDE}},
+        "priors": {k: v for k, v in plan.priors.items() if k in having[name]},
+        "loss": plan.loss,
+    }
     choosing = [n for n in names if any(LOBES[part].has_masking for part in lobe_names(n))]
-    if masking is not None and name in choosing:
-        chosen["masking"] = masking
-    elif masking is not None and not choosing:
-        raise ModelError(f"--masking {masking}: none of {', '.join(names)} has a masking to choose.")
+    if plan.masking is not None and name in choosing:
+        chosen["masking"] = plan.masking
+    elif plan.masking is not None and not choosing:
+        raise ModelError(f"--masking {plan.masking}: none of {', '.join(names)} has a masking to choose.")
     return chosen
+
+
+_BESIDE = {DISCREPANCY}
+# What has a prior beside the parameters of a model.
 
 
 def _match(posteriors: Sequence[Posterior]) -> Comparison | None:
@@ -181,32 +248,53 @@ def _match(posteriors: Sequence[Posterior]) -> Comparison | None:
     return found if np.isfinite(found.hemisphere_distance.value) else None
 
 
-def show(posteriors: Sequence[Posterior], match: Comparison | None, folder: Path) -> None:
-    """Print the parameters of every model, the verdict and where the report is."""
+def show(found: Study, folder: Path) -> None:
+    """Print the parameters of every model, what speaks against them, the verdict and where the report is."""
     out = Console()
-    m = posteriors[0].fit.measurements
-    out.print(str(m), markup=False, highlight=False)
-    out.print(posteriors[0].fit.noise.words, markup=False, highlight=False)
-    if posteriors[0].fit.n_values > MOST_SAMPLED:
+    first = found.posteriors[0].fit
+    out.print(str(first.measurements), markup=False, highlight=False)
+    out.print(first.noise.words, markup=False, highlight=False)
+    if first.n_values > MOST_SAMPLED:
         words = f"More than {MOST_SAMPLED:,} values: intervals from Laplace's approximation, nothing is sampled."
         out.print(words, highlight=False)
-    for posterior in posteriors:
+    if not first.loss.posterior:
+        out.print(f"The loss {first.loss.name} is an objective: single fits, without a posterior.", highlight=False)
+    shown = detailed(found.posteriors, found.match, found.choice)
+    for posterior in shown:
         out.print(f"\n[bold]{_title(posterior)}[/bold]", highlight=False)
         out.print(_table(posterior))
-        if posterior.fit.result != "converged":
-            out.print(f"[yellow]{posterior.fit.result}[/yellow]: {RESULTS[posterior.fit.result]}", highlight=False)
-        if posterior.interrupted:
-            out.print("[yellow]interrupted[/yellow]: sampling was stopped; what was done is kept.", highlight=False)
+        _remark(out, found, posterior)
     out.print("\n→ follows from the parameters above it", highlight=False, style="dim")
-    words = match.verdict if match else " ".join(f"{p.fit.name} {p.fit.adequacy}." for p in posteriors)
-    out.print(f"\n[bold]{words}[/bold]\n", highlight=False)
-    out.print(f"Report: {folder / 'report.html'}", markup=False, highlight=False, soft_wrap=True)
+    if len(shown) < len(found.posteriors):
+        out.print(f"{len(found.posteriors) - len(shown)} more models: see the report.", highlight=False, style="dim")
+    verdicts = [] if found.choice is None or len(found.posteriors) == len(shown) else [found.choice.verdict]
+    adequate = " ".join(f"{p.fit.name} {p.fit.adequacy}." for p in found.posteriors)
+    for words in (*verdicts, found.match.verdict if found.match else adequate):
+        out.print(f"\n[bold]{words}[/bold]", highlight=False)
+    out.print(f"\nReport: {folder / 'report.html'}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _remark(out: Console, found: Study, posterior: Posterior) -> None:
+    """How a fit ended, what speaks against it, and what the angles determine."""
+    if posterior.fit.result != "converged":
+        words = f"[yellow]{posterior.fit.result}[/yellow]: {RESULTS[posterior.fit.result]}"
+        out.print(words, highlight=False)
+    if posterior.interrupted:
+        out.print("[yellow]interrupted[/yellow]: sampling was stopped; what was done is kept.", highlight=False)
+    against = found.doubts(posterior)
+    if against.words:
+        out.print(f"[yellow]{'inadequate' if against.inadequate else 'note'}[/yellow]: {against}", highlight=False)
+    for words in [i.words for i in found.identified if i.fit is posterior.fit]:
+        out.print(words, markup=False, highlight=False)
+    for opinion in [o for o in found.opinions if o.posterior is posterior]:
+        out.print(opinion.words, markup=False, highlight=False)
 
 
 def _title(posterior: Posterior) -> str:
     fit = posterior.fit
     agreeing = f"{fit.n_starts_agreeing} of {fit.n_starts} starts agree"
-    return f"{fit.name}: {fit.result}, {agreeing}, posterior {posterior.verdict}"
+    ending = f"posterior {posterior.verdict}" if fit.loss.posterior else f"loss {fit.loss.name}, no posterior"
+    return f"{fit.name}: {fit.result}, {agreeing}, {ending}"
 
 
 def _table(posterior: Posterior) -> Table:

@@ -22,6 +22,16 @@ def default(source: Path) -> Path:
     return next(p for k in itertools.count(2) if not os.path.exists(p := first.with_name(f"{first.name}-{k}")))
 
 
+def resumed(target: Path) -> Path:
+    """Where a run keeps what it would need to go on, `NAME-fitmat.resume` beside its results."""
+    return target.with_name(f"{target.name}.resume")
+
+
+def discard(folder: Path) -> None:
+    """Remove what has served; what cannot be removed stays."""
+    shutil.rmtree(folder, ignore_errors=True)
+
+
 @contextlib.contextmanager
 def new(target: Path, *, force: bool = False, stale: str = "") -> Iterator[Path]:
     """A folder to write into that appears as `target`, complete, when the block ends well.

@@ -13,6 +13,7 @@ from rich.text import Text
 
 from fitmat import laws
 from fitmat.brdf import LOBES, lobe_names, model
+from fitmat.losses import LOSSES
 
 FRESNEL = "fresnel"
 """The page that compares the Fresnel terms."""
@@ -29,6 +30,24 @@ def list_models() -> None:
         "\nA model is a sum of lobes, lambert+ggx or lambert+ggx-schlick, alone or below a cover: "
         "varnish-over-lambert+ggx.\n'fitmat models ggx' prints the manual page of a lobe, 'fitmat models fresnel' how "
         "exact the Fresnel terms are, 'fitmat models --check' which laws the lobes keep.",
+        highlight=False,
+    )
+
+
+def list_losses() -> None:
+    """Print every loss with its formula, whether it supports a posterior, and where it comes from."""
+    table = _table("loss", "residual", "posterior", "what it is good for", "source")
+    for known in LOSSES.values():
+        table.add_row(
+            *(Text(cell) for cell in (known.name, known.formula, "yes" if known.posterior else "no")),
+            Text(known.doc),
+            Text(known.source),
+        )
+    out = Console()
+    out.print(table)
+    out.print(
+        "\ny measured, f model, c_i = cosθ_i. A loss with a posterior is the logarithm of a probability density; the "
+        "others reproduce published fits and give no intervals. 'fitmat fit FILE --loss NAME' uses one.",
         highlight=False,
     )
 

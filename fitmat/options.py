@@ -21,8 +21,8 @@ File = Annotated[
 Models = Annotated[
     str,
     typer.Option(
-        help="Models to fit, separated by commas; see [bold]fitmat models[/bold]. An empirical and a microfacet "
-        "model are compared. Default: lambert+blinn-phong and lambert+ggx.",
+        help="Models to fit, separated by commas, or 'all'; see [bold]fitmat models[/bold]. An empirical and a "
+        "microfacet model are compared. Default: lambert+blinn-phong and lambert+ggx.",
         metavar="NAMES",
         show_default=False,
     ),
@@ -214,6 +214,42 @@ Converted = Annotated[
 ]
 
 Replace = Annotated[bool, typer.Option("--force", help="Replace the file where it exists.")]
+
+Loss = Annotated[
+    str,
+    typer.Option(
+        help="What the fit minimises, see [bold]fitmat losses[/bold]: default, gaussian, student-t, mixture, log10, …",
+        metavar="NAME",
+    ),
+]
+
+Prior = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="What is known beforehand: centre and standard deviation, e.g. eta=1.5,0.05; repeat for more.",
+        metavar="NAME=CENTRE,SD",
+        show_default=False,
+    ),
+]
+
+CheckPosterior = Annotated[
+    bool,
+    typer.Option("--check-posterior", help="Sample each posterior a second time, with NUTS, and compare."),
+]
+
+For = Annotated[
+    str | None,
+    typer.Option(
+        "--for",
+        help="What to learn: a parameter such as eta, or 'match' to tell the two models apart; default all parameters.",
+        metavar="NAME",
+        show_default=False,
+    ),
+]
+
+Kind = Annotated[str, typer.Option(help="What is measured next: one sample, or a whole curve.", metavar="KIND")]
+
+Count = Annotated[int, typer.Option(min=1, max=50, help="How many measurements to propose.", metavar="N")]
 
 Ior = Annotated[
     str | None,

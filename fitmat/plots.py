@@ -10,15 +10,24 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from fitmat.ablation import Ablation
+from fitmat.choice import SMALL, Choice
 from fitmat.comparison import Comparison
+from fitmat.design import Design
 from fitmat.geometry import signed_zenith
 from fitmat.outcome import Fit
 from fitmat.posterior import Posterior
 from fitmat.prediction import Section, curve, predictive_band, standardised_residuals
+from fitmat.regions import REGIONS
+from fitmat.sphere import Perceived
+from fitmat.telling import SEPARATED, Telling
 
 # Okabe & Ito's palette, safe for colour-blind readers.
 BLACK, ORANGE, BLUE, GREEN, PURPLE = "#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7"
 FIT_COLOURS = (ORANGE, BLUE, GREEN, PURPLE)
+
+MOST_DRAWN = 10.0
+"""ΔE2000 from which on the map of a sphere is equally bright."""
 
 DECADES = 1.5
 """A curve that spans more decades than this is drawn on a logarithmic axis."""
@@ -116,6 +125,110 @@ def plot_albedo(match: Comparison, ax: Axes | None = None) -> Axes:
     return ax
 
 
+def plot_distances(match: Comparison, metric: str = "relative", ax: Axes | None = None) -> Axes:
+    """Distance of the two models at each incidence, over all directions and in each region, with 95 % bands."""
+    ax = ax or new_axes()
+    angle, found = np.rad2deg(match.distances.theta_i), match.distances
+    parts = np.moveaxis(found.by_incidence_and_region[metric], 2, 0)
+    for band, name, colour in zip(parts, REGIONS, FIT_COLOURS, strict=True):
+        ax.plot(angle, band[1], color=colour, lw=1.0, ls="--", label=name)
+    whole = found.by_incidence[metric]
+    ax.fill_between(angle, whole[0], whole[2], color=BLACK, alpha=0.2, lw=0)
+    ax.plot(angle, whole[1], color=BLACK, label="all directions")
+    ax.set_ylim(bottom=0.0)
+    return _against_incidence(ax, f"{metric} distance")
+
+
+def plot_ablation(ablation: Ablation, ax: Axes | None = None) -> Axes:
+    """By how much the distance falls at each incidence without each term of the microfacet lobe, with 95 % bands."""
+    ax = ax or new_axes()
+    angle = np.rad2deg(ablation.theta_i)
+    for (term, fall), colour in zip(ablation.fall.items(), (BLUE, GREEN, PURPLE, BLACK), strict=True):
+        ax.fill_between(angle, 100 * fall[0], 100 * fall[2], color=colour, alpha=0.2, lw=0)
+        ax.plot(angle, 100 * fall[1], color=colour, label="all three" if term == "all" else term)
+    ax.axhline(0.0, color="0.5", lw=0.8, ls="--")
+    ax.set_ylim(bottom=max(-100.0, ax.get_ylim()[0]))  # twice the distance
+    return _against_incidence(ax, "fall of the distance / %")
+
+
+def plot_telling(telling: Telling, ax: Axes | None = None) -> Axes:
+    """The difference of the models in standard deviations, of a reading and of all readings at each incidence."""
+    ax = ax or new_axes()
+    kinds = (telling.rms, ORANGE, "a single reading", 1.0), (telling.separation, BLUE, "all readings", SEPARATED)
+    for band, colour, name, limit in kinds:
+        spread = np.abs(band[[0, 2]] - band[1])
+        ax.errorbar(telling.theta_i_deg, band[1], spread, fmt="o", ms=4, color=colour, label=name)
+        ax.axhline(limit, color=colour, lw=0.8, ls=":")
+    ax.set_yscale("log")
+    return _against_incidence(ax, "difference / standard deviations")
+
+
+def _against_incidence(ax: Axes, label: str) -> Axes:
+    ax.set(xlim=(0, 90), xlabel="incidence θᵢ / °", ylabel=label)
+    ax.legend(fontsize=8)
+    return ax
+
+
+def plot_choice(choice: Choice, ax: Axes | None = None) -> Axes:
+    """How far each model is behind the best in elpd, with standard errors; grey: too close to call."""
+    candidates = choice.candidates
+    ax = ax or new_axes(6.4, 0.9 + 0.3 * len(candidates))
+    for k, c in enumerate(candidates):
+        colour = ORANGE if c.clearly_behind else BLUE
+        hollow = "none" if c.broken else colour
+        ax.errorbar(-c.behind, k, xerr=2 * c.behind_se, fmt="o", color=colour, mfc=hollow, ms=5, lw=1.3, capsize=2)
+    farthest = max((c.behind + 2 * c.behind_se for c in candidates), default=0.0)
+    ax.axvspan(-SMALL, SMALL, color="0.9", zorder=0)
+    if farthest > 20 * SMALL:
+        ax.set_xscale("symlog", linthresh=4 * SMALL)
+    ax.axvline(0.0, color="0.5", lw=0.8, ls="--", zorder=0)
+    ax.set_yticks(range(len(candidates)), [c.name for c in candidates], fontsize=8)
+    ax.set_ylim(len(candidates) - 0.4, -0.6)
+    ax.set_xlabel("elpd to the best, ± 2 standard errors (hollow: breaks a law of reflection)", fontsize=8)
+    ax.tick_params(axis="x", labelsize=7)
+    return ax
+
+
+def plot_left_out(choice: Choice, *, most: int = 4, ax: Axes | None = None) -> Axes:
+    """Prediction errors of incidences that were left out, for the `most` best models that were refitted."""
+    ax = ax or new_axes()
+    shown = [c for c in choice.candidates if c.left_out is not None][:most]
+    for c, colour, marker in zip(shown, FIT_COLOURS, "os^D", strict=False):
+        assert c.left_out is not None
+        ax.plot(c.left_out.theta_i_deg, c.left_out.cube_root, marker, ls="-", color=colour, ms=4, lw=1, label=c.name)
+    ax.set(xlim=(0, 90), ylim=(0, None))
+    ax.set_xlabel("incidence left out, θᵢ / °", fontsize=8)
+    ax.set_ylabel("rms error of ∛(f cosθᵢ) / sr$^{-1/3}$", fontsize=8)
+    ax.tick_params(labelsize=7)
+    ax.legend(fontsize=8)
+    return ax
+
+
+def plot_spheres(perceived: Perceived) -> Figure:
+    """Both models' spheres, and below them where an eye sees a difference; one column for each lighting."""
+    rows, count = (*perceived.names, "difference"), len(perceived.lightings)
+    figure = Figure(figsize=(1.35 * count + 0.9, 4.3), layout="constrained")
+    axes = figure.subplots(3, count, squeeze=False)
+    for k, lighting in enumerate(perceived.lightings):
+        for ax, picture in zip(axes[:, k], (lighting.empirical, lighting.microfacet), strict=False):
+            seen = np.isfinite(picture).all(axis=2, keepdims=True)
+            ax.imshow(np.concatenate([np.where(seen, picture, 0.0), seen], axis=2))
+        axes[2, k].imshow(lighting.difference, cmap="magma", vmin=0.0, vmax=MOST_DRAWN)
+        axes[0, k].set_title(lighting.name, fontsize=8)
+        axes[2, k].set_xlabel(f"ΔE2000 {lighting.delta_e_2000.mean.value:.1f} on average", fontsize=7)
+    for label, ax in zip(rows, axes[:, 0], strict=True):
+        ax.set_ylabel(label.replace("+", "+\n"), fontsize=8)
+    for ax in axes.flat:
+        ax.set(xticks=[], yticks=[])
+        ax.spines[:].set_visible(False)
+    every, scale = axes.ravel().tolist(), axes[2, 0].images[0]
+    bar = figure.colorbar(scale, ax=every, shrink=0.3, anchor=(0.0, 0.03), extend="max", pad=0.02)
+    bar.set_ticks([0, 1, 3, MOST_DRAWN])
+    bar.set_label("ΔE2000", fontsize=8)
+    bar.ax.tick_params(labelsize=7)
+    return figure
+
+
 def plot_corner(posterior: Posterior) -> Figure:
     """Every free parameter against every other, with the best fit marked; fixed ones are left out."""
     fit = posterior.fit
@@ -143,3 +256,45 @@ def plot_corner(posterior: Posterior) -> Figure:
     if not several:  # corner cannot mark the best fit of a single parameter
         figure.axes[0].axvline(fit.values[columns[0]], color=ORANGE)
     return figure
+
+
+def plot_design(design: Design, ax: Axes | None = None) -> Axes:
+    """Expected gain of a first measurement over the plane of incidence, the file's samples, and the proposals in order.
+
+    Args:
+        design: From `next_angles`; of curves the gain is drawn over the incidence.
+        ax: Where to draw; a new figure if None.
+    """
+    ax = ax or new_axes(5.6, 4.4)
+    c, flat = design.candidates, np.abs(design.candidates.phi - np.pi) < 1e-6
+    flat &= c.phi_i == c.phi_i[0]
+    what = "models apart / sd" if design.rival else "sd shrinks by a factor"
+    if design.kind == "curve":
+        ax.plot(np.rad2deg(c.theta_i[flat]), design.gains[flat], ".-", color=BLUE, label="in the plane of incidence")
+        across = ~flat & (c.phi_i == c.phi_i[0])
+        ax.plot(np.rad2deg(c.theta_i[across]), design.gains[across], ".--", color=GREEN, label="across it")
+        for k, p in enumerate(design.proposals):
+            ax.axvline(np.rad2deg(p.theta_i), color=ORANGE, lw=0.8, ls=":")
+            ax.annotate(str(k + 1), (np.rad2deg(p.theta_i), 1.0 - 0.06 * (k + 1)), xycoords=("data", "axes fraction"))
+        ax.set(xlabel="incidence θᵢ / °", ylabel=what, xlim=(0, 90))
+        ax.legend(fontsize=8)
+        return ax
+    x, y = np.rad2deg(c.theta_o[flat, 0]), np.rad2deg(c.theta_i[flat])
+    drawn = ax.tricontourf(x, y, np.log10(np.maximum(design.gains[flat], 1e-3)), levels=16, cmap="cividis")
+    bar = ax.figure.colorbar(drawn, ax=ax, format=lambda v, _: f"{10**v:.3g}")
+    bar.set_label(what)
+    m = design.fit.measurements
+    rows = m.in_plane & m.valid.any(axis=1)
+    signed, light = np.rad2deg(m.signed_theta_o[rows]), np.rad2deg(m.theta_i[rows])
+    ax.plot(signed, light, ".", color="white", ms=2.5, mec=BLACK, mew=0.2, label="measured")
+    for k, p in enumerate(design.proposals):
+        inside = abs(p.phi - np.pi) < 1e-6
+        at = float(np.rad2deg(p.theta_o[0])), float(np.rad2deg(p.theta_i))
+        ax.plot(*at, "o" if inside else "s", color=ORANGE, ms=9, mec="white")
+        beside = "" if inside else f" φ {np.rad2deg(p.phi):.0f}°"
+        ax.annotate(f"{k + 1}{beside}", at, ha="center", va="center", fontsize=7, color="white")
+    ax.set(xlim=(-90, 90), ylim=(-2, 90), xticks=[-60, -30, 0, 30, 60])
+    ax.set_xlabel("θₒ / °  (positive = mirror side)")
+    ax.set_ylabel("incidence θᵢ / °")
+    ax.legend(fontsize=8, loc="lower left")
+    return ax

@@ -14,6 +14,17 @@ from jaxtyping import Float
 from fitmat.display import html_table, text_table, with_error
 from fitmat.outcome import Fit
 
+VERDICTS = {
+    "reliable": "The walks are long enough and agree with each other.",
+    "tentative": "The walks are short: the intervals may still move. Let them run longer.",
+    "unusable": "There is nothing to take intervals from: the walks do not agree, or nothing finite was found.",
+    "corrected": "Not sampled: draws around the best fit, weighted until they follow the posterior itself.",
+    "approximate": "Not sampled: a Gaussian around the best fit, which the posterior does not follow well. "
+    "Sample it before relying on the intervals.",
+    "not sampled": "Not sampled: a Gaussian around the best fit.",
+}
+"""How far draws can be trusted, and what that means."""
+
 ENOUGH_TAU = 50
 """A chain of this many autocorrelation times is long enough (emcee's documentation)."""
 
@@ -22,6 +33,10 @@ ENOUGH_ESS = 400
 
 GOOD_RHAT = 1.05
 """Split-R̂ over walkers up to which the posterior counts as converged."""
+
+
+GOOD_PARETO = 0.7
+"""Pareto k̂ of importance weights up to which their averages can be relied on (Vehtari et al. 2024, sec. 3)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,6 +76,7 @@ class Posterior:
         chain: For emcee, the same before flattening, (steps, walkers, free + 1), physical; else None.
         diagnostics: For emcee; else None.
         interrupted: Whether the user stopped the sampling.
+        pareto_k: k̂ of the weights by which Laplace's draws were corrected; None where that was not tried.
     """
 
     fit: Fit
@@ -70,20 +86,26 @@ class Posterior:
     chain: np.ndarray | None = None
     diagnostics: Diagnostics | None = None
     interrupted: bool = False
+    pareto_k: float | None = None
 
     @property
     def verdict(self) -> str:
-        """One of "reliable", "tentative", "unusable", and "not sampled" for Laplace."""
+        """A key of `VERDICTS`: one of the first three for chains, one of the last three for Laplace."""
         if not self.fit.finite:
             return "unusable"
         if self.diagnostics is None:
-            return "not sampled"
+            return "not sampled" if self.pareto_k is None else ("corrected", "approximate")[self.pareto_k > GOOD_PARETO]
         d = self.diagnostics
         kept = d.steps - d.burn_in
         if not np.isfinite(d.tau).all() or kept < 10 * d.tau.max() or d.rhat.max() > 1.2:
             return "unusable"
         enough = kept >= ENOUGH_TAU * d.tau.max() and d.ess.min() >= ENOUGH_ESS and d.rhat.max() <= GOOD_RHAT
         return "reliable" if enough else "tentative"
+
+    @property
+    def exact(self) -> bool:
+        """Whether the draws follow the density itself, so that intervals are taken from them, not from a Gaussian."""
+        return self.verdict in ("reliable", "tentative", "corrected")
 
     @property
     def usable(self) -> bool:

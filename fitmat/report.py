@@ -18,103 +18,38 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from fitmat import plots
-from fitmat.comparison import CLOSE, SIMILAR, Comparison, Estimate
-from fitmat.display import interval, plain, with_error
+from fitmat import plots, priors, record
+from fitmat.ablation import EXPLAINS, TERMS
+from fitmat.choice import Choice
+from fitmat.comparison import Comparison
+from fitmat.display import interval, with_error
+from fitmat.distances import METRICS
+from fitmat.headline import CLOSE, SIMILAR
 from fitmat.measurement import Measurements
 from fitmat.metrics import fit_metrics
-from fitmat.outcome import RESULTS
-from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, Posterior
+from fitmat.outcome import RESULTS, Fit
+from fitmat.params import space
+from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS, Posterior
 from fitmat.prediction import sections
-from fitmat.summary import Quantity, derived, parameters
+from fitmat.regions import GRAZING_DEG, REGIONS
+from fitmat.spectra import WHITE_LUMINANCE
+from fitmat.sphere import CLEARLY_VISIBLE, JUST_NOTICEABLE
+from fitmat.study import Study
+from fitmat.summary import derived, parameters
+from fitmat.telling import SEPARATED
 
 DPI = 96
 CHANNELS_DRAWN = 3
 POSTERIOR = "posterior-{}.nc"
 
 
-def write(folder: Path, posteriors: Sequence[Posterior], match: Comparison | None) -> None:
+def write(folder: Path, study: Study) -> None:
     """Write `report.html`, `fit.json` and one `posterior-MODEL.nc` per model into an existing folder."""
-    found = to_dict(posteriors, match)
+    found = record.to_dict(study)
     (folder / "fit.json").write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    for posterior in posteriors:
+    for posterior in study.posteriors:
         posterior.save(folder / POSTERIOR.format(posterior.fit.name))
-    (folder / "report.html").write_text(to_html(posteriors, match), encoding="utf-8")
-
-
-def to_dict(posteriors: Sequence[Posterior], match: Comparison | None) -> dict[str, Any]:
-    """What the report holds, as JSON types; numbers that are not finite become null."""
-    m = posteriors[0].fit.measurements
-    return plain(
-        {
-            "fitmat": version("fitmat"),
-            "file": m.source,
-            "n_samples": m.n_samples,
-            "n_masked": m.n_masked,
-            "masked": m.masked,
-            "notes": [*m.notes, *filter(None, [str(m.instrument)])],
-            "noise": posteriors[0].fit.noise.words,
-            "channels": list(m.channels),
-            "fits": [_fit_dict(p, len(m.channels)) for p in posteriors],
-            "match": None if match is None else _match_dict(match),
-        }
-    )
-
-
-def _fit_dict(posterior: Posterior, channels: int) -> dict[str, Any]:
-    fit, d = posterior.fit, posterior.diagnostics
-    diagnosed = {"ess_min": None, "rhat_max": None, "tau_max": None}
-    if d is not None:
-        diagnosed = {"ess_min": d.ess.min(), "rhat_max": d.rhat.max(), "tau_max": d.tau.max()}
-        diagnosed |= {"acceptance": d.acceptance, "steps": d.steps, "burn_in": d.burn_in, "walkers": d.walkers}
-        diagnosed |= {"seed": d.seed}
-    return {
-        "model": fit.name,
-        "result": fit.result,
-        "result_means": RESULTS[fit.result],
-        "adequacy": fit.adequacy,
-        "not_determined": list(fit.undetermined),
-        "n_starts": fit.n_starts,
-        "n_starts_agreeing": fit.n_starts_agreeing,
-        "steps": fit.steps,
-        "parameters": {q.name: _quantity_dict(q, channels) for q in parameters(posterior)},
-        "derived": {q.name: _quantity_dict(q, channels) for q in derived(posterior)},
-        "posterior": {"verdict": posterior.verdict, "interrupted": posterior.interrupted, **diagnosed},
-        "metrics": fit_metrics(fit),
-        "log_likelihood": fit.log_likelihood,
-        "aicc": fit.aicc,
-        "bic": fit.bic,
-    }
-
-
-def _quantity_dict(q: Quantity, channels: int) -> dict[str, Any]:
-    """Scalars for shared quantities and single-channel files, else lists in channel order."""
-    scalar = not q.per_channel or channels == 1
-    value, sd, ci95 = ((a[0] if scalar else a) for a in (q.value, q.sd, q.ci95))
-    return {"value": value, "sd": sd, "ci95": ci95, "unit": q.unit, "symbol": q.symbol, "remark": q.remark}
-
-
-def _match_dict(match: Comparison) -> dict[str, Any]:
-    def estimate(e: Estimate | None) -> dict[str, Any] | None:
-        return None if e is None else {"value": e.value, "ci95": list(e.ci95)}
-
-    return {
-        "empirical": match.empirical.fit.name,
-        "microfacet": match.microfacet.fit.name,
-        "hemisphere_distance": estimate(match.hemisphere_distance),
-        "measured_distance": estimate(match.measured_distance),
-        "cube_root_distance": estimate(match.cube_root_distance),
-        "albedo_gap_max": {
-            **(estimate(match.albedo_gap_max) or {}),
-            "theta_i_deg": match.albedo_gap_theta_i_deg,
-            "sign": match.albedo_gap_sign,
-        },
-        "implied_exponent": estimate(match.implied_exponent),
-        "fitted_exponent": estimate(match.fitted_exponent),
-        "delta_aicc": match.delta_aicc,
-        "delta_bic": match.delta_bic,
-        "verdict": match.verdict,
-    }
+    (folder / "report.html").write_text(to_html(study), encoding="utf-8")
 
 
 def rows(posterior: Posterior) -> list[dict[str, str]]:
@@ -146,28 +81,103 @@ def rows(posterior: Posterior) -> list[dict[str, str]]:
     return result
 
 
-def to_html(posteriors: Sequence[Posterior], match: Comparison | None) -> str:
+def to_html(study: Study) -> str:
     """The page: verdict, pictures, then numbers; pictures are embedded, nothing is fetched."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("fitmat"), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters |= {"png": _png, "subscripted": _subscripted}
+    posteriors = study.posteriors
     return environment.get_template("report.html").render(
         version=version("fitmat"),
+        study=study,
         posteriors=posteriors,
         measurements=posteriors[0].fit.measurements,
-        match=match,
-        close=CLOSE,
-        similar=SIMILAR,
+        loss=posteriors[0].fit.loss,
+        doubts=[(p.fit, study.doubts(p)) for p in posteriors],
+        left_out=_left_out(posteriors[0].fit),
         rows=rows,
+        prior_rows=prior_rows,
         results=RESULTS,
+        verdicts=VERDICTS,
         metrics=fit_metrics,
         curves=_curves(posteriors),
         residuals=_residuals(posteriors),
         enough={"tau": ENOUGH_TAU, "ess": ENOUGH_ESS, "rhat": GOOD_RHAT},
-        albedo=None if match is None else plots.plot_albedo(match).figure,
-        corners=[(p.fit.name, plots.plot_corner(p)) for p in posteriors if p.fit.finite and len(p.fit.free)],
+        corners=[(p.fit.name, plots.plot_corner(p)) for p in posteriors if _has_posterior(p)],
+        **_match_parts(study.match),
+        **_choice_parts(study.choice),
+        identified=study.identified,
+        checks=study.checks,
+        opinions=study.opinions,
     )
+
+
+def _match_parts(match: Comparison | None) -> dict[str, Any]:
+    """What the template says of the match, with its pictures."""
+    if match is None:
+        return {"match": None}
+    seen = match.perceived
+    return {
+        "match": match,
+        "albedo": plots.plot_albedo(match).figure,
+        "close": CLOSE,
+        "similar": SIMILAR,
+        "regions": REGIONS,
+        "metrics_of_match": METRICS,
+        "terms": TERMS,
+        "separated": SEPARATED,
+        "explains": EXPLAINS,
+        "grazing_deg": GRAZING_DEG,
+        "distances_figure": plots.plot_distances(match).figure,
+        "ablation_figure": None if match.ablation is None else plots.plot_ablation(match.ablation).figure,
+        "telling_figure": plots.plot_telling(match.telling).figure if match.telling.known else None,
+        "perceived": seen,
+        "spheres": None if seen is None else plots.plot_spheres(seen),
+        "just_noticeable": JUST_NOTICEABLE,
+        "clearly_visible": CLEARLY_VISIBLE,
+        "white_luminance": WHITE_LUMINANCE,
+    }
+
+
+def _choice_parts(choice: Choice | None) -> dict[str, Any]:
+    """What the template says of the choice, with its pictures."""
+    if choice is None:
+        return {"choice": None}
+    predicted = any(c.left_out is not None for c in choice.candidates)
+    return {
+        "choice": choice,
+        "choice_picture": plots.plot_choice(choice).figure,
+        "left_out_picture": plots.plot_left_out(choice).figure if predicted else None,
+    }
+
+
+def prior_rows(posterior: Posterior) -> list[dict[str, str]]:
+    """One line per free parameter: its prior, what the data made of it, and how much narrower that is."""
+    fit = posterior.fit
+    before, prior_sd = priors.words(fit.model, fit.data.prior), priors.natural_sd(fit.model, fit.data.prior)
+    after = space(fit.model).natural_array(posterior.values).std(axis=0)
+    known = {row["name"]: row for row in rows(posterior) if row["kind"] == "fitted"}
+    channels, found = fit.measurements.channels, []
+    for entry in (e for e in fit.entries if e.name not in fit.held):
+        for k in range(entry.size):
+            name = entry.name + (f" {channels[k]}" if entry.shape and len(channels) > 1 else "")
+            place = entry.place.start + k
+            narrower = prior_sd[place] / max(after[place], 1e-300)
+            line = {"name": name, "symbol": entry.param.symbol, "prior": before[entry.name][k]}
+            found.append(line | {"posterior": known[name]["interval"], "narrower": f"{narrower:.3g}"})
+    return found
+
+
+def _has_posterior(posterior: Posterior) -> bool:
+    fit = posterior.fit
+    return fit.finite and fit.loss.posterior and len(fit.free) > 0
+
+
+def _left_out(fit: Fit) -> str:
+    """What the loss could not be applied to, in words."""
+    count = fit.measurements.n_valid - fit.n_values
+    return f"{count} values left out: {fit.loss.unusable}." if fit.loss.usable is not None and count > 0 else ""
 
 
 def _curves(posteriors: Sequence[Posterior]) -> list[tuple[str, Figure]]:

@@ -44,11 +44,11 @@ class Quantity:
 def parameters(posterior: Posterior) -> list[Quantity]:
     """The model's parameters, then the discrepancy s.
 
-    Value: the best fit. Intervals: quantiles of the sampled posterior where it is usable; otherwise Laplace, computed
-    in the logarithm for parameters whose scale is log.
+    Value: the best fit. Intervals: quantiles of the draws where these follow the posterior itself; otherwise Laplace,
+    computed in the logarithm for parameters whose scale is log.
     """
     fit = posterior.fit
-    sampled = posterior.method == "emcee" and posterior.usable
+    sampled = posterior.exact
     sd = posterior.sd() if sampled else np.sqrt(np.diagonal(fit.covariance))
     ci95 = posterior.interval() if sampled else _laplace_interval(posterior, sd)
     bound = space(fit.model).at_bound(fit.values)

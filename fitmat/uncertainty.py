@@ -4,14 +4,18 @@ This is the only room that imports emcee.
 """
 
 import dataclasses
+import importlib.metadata
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 
-from fitmat.approximation import draws, gaussian, laplace
+from fitmat.approximation import draws, independent_proposal, laplace
+from fitmat.checkpoint import Checkpoint, Saved, digest
 from fitmat.density import default_walkers, log_posterior, physical
-from fitmat.errors import FitmatError
+from fitmat.errors import FitmatError, OutputError
 from fitmat.outcome import Fit
 from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, Diagnostics, Posterior, split_rhat
 
@@ -21,8 +25,11 @@ CHUNK = 50
 SHORTEST = 250
 """Steps that every chain has, however short its autocorrelation time."""
 
-HEAVY_TAIL = 6.0
-"""Degrees of freedom of the t distribution that proposes draws of its own around the Laplace approximation."""
+MAX_STEPS = 8_000
+"""Cap on the steps of every walker."""
+
+SAMPLED_BY = ("fitmat", "emcee", "numpy", "jax", "jaxlib")
+"""Whose versions decide the last digit of a chain."""
 
 Progress = Callable[[int, int], None]
 """Called with steps done and steps expected."""
@@ -33,8 +40,9 @@ def sample(
     *,
     seed: int,
     walkers: int | None = None,
-    max_steps: int = 8_000,
+    max_steps: int = MAX_STEPS,
     progress: Progress | None = None,
+    checkpoint: Path | None = None,
 ) -> Posterior:
     """Sample the posterior with emcee until the autocorrelation time says enough.
 
@@ -49,33 +57,29 @@ def sample(
         walkers: Size of the ensemble; default the larger of 32 and 4 per dimension.
         max_steps: Cap on steps per walker.
         progress: Called now and then with steps done and steps expected.
+        checkpoint: Folder in which the run is kept while it lasts, and from which the same run goes on after it was
+            killed, to the same chain; damaged parts of it are left out with a warning. Remove it when it has served.
 
     Returns:
         A `Posterior`. An interrupt (Ctrl-C) ends the run and keeps what was done.
 
     Raises:
-        FitmatError: the fit is not finite.
+        FitmatError: the fit is not finite, or the folder holds checkpoints of another run.
+        OutputError: the folder cannot be made.
     """
-    import emcee
-
-    if not fit.finite:
-        raise FitmatError(f"{fit.name}: the fit ended {fit.result}, there is nothing to sample; check the data.")
-    rng = np.random.default_rng(seed)
-    dimensions = len(fit.free) + 1
-    walkers = walkers or default_walkers(fit)
-    independent = emcee.moves.MHMove(_independent_proposal(fit))
-    moves = [(independent, 0.6), (emcee.moves.DEMove(), 0.3), (emcee.moves.DESnookerMove(), 0.1)]
-    density = log_posterior(fit, walkers)
-    sampler: Any = emcee.EnsembleSampler(walkers, dimensions, density, moves=moves, vectorize=True)
-    sampler.log_prob_fn = density  # emcee's wrapper prints a traceback to stdout on Ctrl-C
-    random_state = np.random.RandomState(rng.integers(2**32)).get_state()
-    state = emcee.State(draws(fit, walkers, rng), random_state=random_state)
-    goal, interrupted = SHORTEST, False
+    sampler, state = _ensemble(fit, seed, walkers)
+    kept, goal = None, SHORTEST
+    if checkpoint is not None:
+        kept = Checkpoint(checkpoint, _run(fit, state, seed, max_steps))
+        state, goal = (state, goal) if kept.saved is None else (_resumed(sampler, kept.saved), kept.saved.goal)
+    interrupted = False
     try:
         while (done := sampler.iteration) < min(goal, max_steps):
             state = sampler.run_mcmc(state, min(CHUNK, max_steps - done), skip_initial_state_check=True)
             if sampler.iteration >= SHORTEST:
-                goal = max(goal, _steps_needed(sampler, walkers))
+                goal = max(goal, _steps_needed(sampler))
+            if kept is not None:
+                kept.write(sampler.backend, goal, finished=sampler.iteration >= min(goal, max_steps))
             if progress is not None:
                 progress(sampler.iteration, min(max(goal, sampler.iteration), max_steps))
     except KeyboardInterrupt:
@@ -85,10 +89,66 @@ def sample(
     return _posterior(fit, sampler, seed, interrupted)
 
 
-def _steps_needed(sampler: Any, walkers: int) -> int:
+def resumable_steps(
+    fit: Fit, *, seed: int, checkpoint: Path, walkers: int | None = None, max_steps: int = MAX_STEPS
+) -> int:
+    """The step from which `sample` with the same arguments would go on; 0 where nothing of this run is kept.
+
+    Raises:
+        FitmatError: the fit is not finite.
+        OutputError: the folder cannot be made or read.
+    """
+    _, state = _ensemble(fit, seed, walkers)
+    run = _run(fit, state, seed, max_steps)
+    try:
+        saved = Checkpoint(checkpoint, run).saved
+    except OutputError:
+        raise
+    except FitmatError:
+        return 0
+    return 0 if saved is None else len(saved.chain)
+
+
+def _ensemble(fit: Fit, seed: int, walkers: int | None) -> tuple[Any, Any]:
+    """The sampler, and the state in which a run begins."""
+    import emcee
+
+    if not fit.finite:
+        raise FitmatError(f"{fit.name}: the fit ended {fit.result}, there is nothing to sample; check the data.")
+    rng = np.random.default_rng(seed)
+    walkers = walkers or default_walkers(fit)
+    independent = emcee.moves.MHMove(independent_proposal(fit))
+    moves = [(independent, 0.6), (emcee.moves.DEMove(), 0.3), (emcee.moves.DESnookerMove(), 0.1)]
+    density = log_posterior(fit, walkers)
+    sampler: Any = emcee.EnsembleSampler(walkers, len(fit.free) + 1, density, moves=moves, vectorize=True)
+    sampler.log_prob_fn = density  # emcee's wrapper prints a traceback to stdout on Ctrl-C
+    random_state = np.random.RandomState(rng.integers(2**32)).get_state()
+    return sampler, emcee.State(draws(fit, walkers, rng), random_state=random_state)
+
+
+def _run(fit: Fit, state: Any, seed: int, max_steps: int) -> bytes:
+    """Digest of all that decides a chain: its beginning, the density there, model, data, priors, seed and versions."""
+    versions = [f"{name} {importlib.metadata.version(name)}" for name in SAMPLED_BY]
+    density = log_posterior(fit, len(state.coords))(state.coords)
+    words = ", ".join([fit.name, f"seed {seed}", f"at most {max_steps} steps", *sorted(fit.held), *versions])
+    leaves = [np.asarray(leaf) for leaf in jax.tree.leaves((fit.model, fit.data))]
+    return digest(words, [state.coords, density, state.random_state[1], *leaves])
+
+
+def _resumed(sampler: Any, saved: Saved) -> Any:
+    """The state in which a run goes on, its past given back to the sampler."""
+    import emcee
+
+    past = sampler.backend
+    past.chain, past.log_prob, past.accepted = saved.chain, saved.log_prob, saved.accepted
+    past.iteration, past.random_state = len(saved.chain), saved.random_state
+    return emcee.State(saved.chain[-1], log_prob=saved.log_prob[-1], random_state=saved.random_state)
+
+
+def _steps_needed(sampler: Any) -> int:
     tau = sampler.get_autocorr_time(tol=0)
     worst = float(np.nanmax(tau)) if np.isfinite(tau).any() else float(sampler.iteration)
-    return int(np.ceil(worst * (5 + max(ENOUGH_TAU, ENOUGH_ESS / walkers)))) + 1
+    return int(np.ceil(worst * (5 + max(ENOUGH_TAU, ENOUGH_ESS / sampler.nwalkers)))) + 1
 
 
 def _posterior(fit: Fit, sampler: Any, seed: int, interrupted: bool) -> Posterior:
@@ -111,26 +171,3 @@ def _posterior(fit: Fit, sampler: Any, seed: int, interrupted: bool) -> Posterio
         seed=seed,
     )
     return Posterior(fit, "emcee", values, discrepancy, sampled.reshape(chain.shape), found, interrupted)
-
-
-def _independent_proposal(fit: Fit) -> Callable[[np.ndarray, Any], tuple[np.ndarray, np.ndarray]]:
-    """Draws from a multivariate t around the Laplace approximation, s folded at 0, with their log density ratio."""
-    centre, covariance = gaussian(fit)
-    factor = np.linalg.cholesky(covariance + 1e-12 * np.diag(np.diagonal(covariance)))
-    whitening = np.linalg.inv(factor)
-    flip = np.append(np.ones(len(centre) - 1), -1.0)
-
-    def one_side(x: np.ndarray) -> np.ndarray:
-        distance = np.sum(((x - centre) @ whitening.T) ** 2, axis=1)
-        return -0.5 * (HEAVY_TAIL + len(centre)) * np.log1p(distance / HEAVY_TAIL)
-
-    def log_density(x: np.ndarray) -> np.ndarray:
-        return np.logaddexp(one_side(x), one_side(x * flip))
-
-    def propose(coordinates: np.ndarray, random: Any) -> tuple[np.ndarray, np.ndarray]:
-        stretch = np.sqrt(HEAVY_TAIL / random.chisquare(HEAVY_TAIL, size=len(coordinates)))
-        drawn = centre + stretch[:, None] * (random.standard_normal(coordinates.shape) @ factor.T)
-        drawn[:, -1] = np.abs(drawn[:, -1])
-        return drawn, log_density(coordinates) - log_density(drawn)
-
-    return propose

@@ -1,0 +1,229 @@
+"""Ablation: which of the microfacet lobe's terms make an empirical model differ from it, and at which incidence.
+
+Blinn–Phong is the microfacet lobe F D G/(4 c_i c_o) with F constant, G/(c_i c_o) = 1 and D a cosine power. Each term is
+replaced in turn and the distance measured again. Nothing is fitted again, and the falls do not add up: a product of two
+terms that both rise towards grazing comes down without either.
+"""
+
+import dataclasses
+from typing import ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from fitmat._types import Scalar, Spectrum, Vec3
+from fitmat.brdf import AbstractBRDF, surface
+from fitmat.brdf.base import Sum
+from fitmat.brdf.cook_torrance import CookTorrance
+from fitmat.brdf.microfacet import Microfacet
+from fitmat.brdf.walter import Walter
+from fitmat.conversion import exponent_from_alpha
+from fitmat.distances import ANGLES, AZIMUTHS, Values
+from fitmat.estimate import Estimate, band, estimate
+from fitmat.fresnel import AbstractFresnel
+from fitmat.microfacet import AbstractDistribution, Beckmann, Slopes
+from fitmat.params import with_vector
+from fitmat.quadrature import lobe_rule
+from fitmat.regions import GRAZING_DEG
+
+TERMS = {
+    "fresnel": "no Fresnel term",
+    "masking": "no masking and foreshortening G/(cosθ_i cosθ_o)",
+    "tail": "no long tail",
+    "all": "none of the three",
+}
+"""What is replaced → what an empirical lobe lacks."""
+
+NODES = (40, 16)
+"""Of the quadrature over ω_o, in zenith and azimuth: falls are then right to 0.01."""
+
+EXPLAINS = 0.2
+"""A term is named as the cause where the distance falls by at least this fraction without it."""
+
+
+class ConstantFresnel(AbstractFresnel):
+    """A Fresnel term held at its normal incidence.
+
+    F(c) = F(1) of the term within.
+    """
+
+    suffix: ClassVar[str] = "-constant"
+    within: AbstractFresnel
+
+    def __call__(self, cos_d: Scalar) -> Spectrum:
+        """Reflectance at normal incidence, whatever the angle."""
+        del cos_d
+        return self.normal_reflectance()
+
+    def normal_reflectance(self) -> Spectrum:
+        """That of the term within."""
+        return self.within.normal_reflectance()
+
+
+class ImplicitMasking(AbstractDistribution):
+    """A distribution whose separable masking is G = c_i c_o, that of every lobe written without one.
+
+    With 1 + Λ = 1/c the masked cosine is 1, and G/(c_i c_o) = 1 ("implicit" in B. Karis, Real shading in Unreal Engine
+    4, SIGGRAPH course 2013). G = 1 would be another thing: it keeps 1/(c_i c_o), which no empirical lobe has.
+    """
+
+    label: ClassVar[str] = "implicit"
+    within: AbstractDistribution
+
+    def density(self, h: Vec3, slopes: Slopes) -> Scalar:
+        """That of the distribution within."""
+        return self.within.density(h, slopes)
+
+    def masked_cos(self, w: Vec3, slopes: Slopes) -> Scalar:
+        """1."""
+        return jnp.ones_like(w[2])
+
+
+class CosinePower(AbstractDistribution):
+    """Blinn's distribution with the peak of the one within, whose masking it keeps.
+
+    D = (n+2)/(2π) c_hⁿ with n = 2/α² − 2 (Walter et al. 2007, eq. 30 and sec. 5.2), along and across the tangent of an
+    anisotropic surface as Ashikhmin & Shirley 2000 have it, with √((n_x+2)(n_y+2)) in front.
+    """
+
+    label: ClassVar[str] = "cosine-power"
+    within: AbstractDistribution
+
+    def density(self, h: Vec3, slopes: Slopes) -> Scalar:
+        """√((n_x+2)(n_y+2))/(2π) c_hⁿ, n = n_x cos²φ_h + n_y sin²φ_h."""
+        nx, ny = (exponent_from_alpha(alpha) for alpha in slopes)
+        across = h[0] ** 2 + h[1] ** 2
+        share = jnp.where(across > 0.0, h[0] ** 2 / jnp.where(across > 0.0, across, 1.0), 0.5)
+        n = ny + (nx - ny) * share
+        return jnp.sqrt((nx + 2.0) * (ny + 2.0)) / (2.0 * jnp.pi) * jnp.maximum(h[2], 1e-300) ** n
+
+    def masked_cos(self, w: Vec3, slopes: Slopes) -> Scalar:
+        """That of the distribution within."""
+        return self.within.masked_cos(w, slopes)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Ablation:
+    """What the difference of two models owes to each term of the microfacet lobe.
+
+    Attributes:
+        theta_i: Incidence, radians, (k,).
+        distance: √(∫ (f_P − f_M)² c_o / ∫ f_M² c_o) at each incidence, rows low, best, high, (3, k).
+        fall: Term of `TERMS` → fraction by which the distance falls without it, (3, k); negative where it grows.
+        near: The same over incidences up to `GRAZING_DEG`, weighted with cosθ_i sinθ_i.
+        grazing: The same beyond.
+    """
+
+    theta_i: Float[np.ndarray, " k"]
+    distance: Float[np.ndarray, "3 k"]
+    fall: dict[str, Float[np.ndarray, "3 k"]]
+    near: dict[str, Estimate]
+    grazing: dict[str, Estimate]
+
+    def causes(self, where: dict[str, Estimate]) -> tuple[str, ...]:
+        """The terms without which the distance certainly falls by `EXPLAINS` or more, the strongest first.
+
+        Args:
+            where: `near` or `grazing`.
+        """
+        single = [term for term in where if term != "all" and where[term].ci95[0] > 0.0]
+        return tuple(sorted((t for t in single if where[t].value >= EXPLAINS), key=lambda t: -where[t].value))
+
+
+def can_ablate(model: AbstractBRDF) -> bool:
+    """Whether the model has a microfacet lobe whose terms can be replaced one by one."""
+    return ablated(model, "all") is not surface(model)
+
+
+def ablated(model: AbstractBRDF, term: str) -> AbstractBRDF:
+    """The model's surface with a term of `TERMS` replaced in its microfacet lobes; the same object where it has none.
+
+    Args:
+        model: From `fitmat.model`, or as an instrument shows it.
+        term: "fresnel", "masking", "tail", or "all".
+    """
+    return _replaced(surface(model), tuple(TERMS)[:3] if term == "all" else (term,))
+
+
+def _replaced(model: AbstractBRDF, terms: tuple[str, ...]) -> AbstractBRDF:
+    if isinstance(model, Sum):
+        lobes = tuple(_replaced(lobe, terms) for lobe in model.lobes)
+        same = all(one is other for one, other in zip(lobes, model.lobes, strict=True))
+        return model if same else Sum(lobes)
+    lobe = _microfacet(model)
+    if lobe is None:
+        return model
+    fresnel, distribution, masking = lobe.fresnel, lobe.distribution, lobe.masking
+    if "fresnel" in terms:
+        fresnel = ConstantFresnel(fresnel)
+    if "tail" in terms:
+        distribution = CosinePower(distribution)
+    if "masking" in terms:
+        distribution, masking = ImplicitMasking(distribution), "separable"
+    return Microfacet(lobe.ks, lobe.roughness, fresnel, distribution, masking)
+
+
+def _microfacet(lobe: AbstractBRDF) -> Microfacet | None:
+    """The lobe as F D G/(4 c_i c_o) where it is one."""
+    if isinstance(lobe, Walter):
+        return Microfacet(lobe.ks, lobe.roughness, lobe.fresnel, lobe.distribution, "separable")
+    if isinstance(lobe, CookTorrance):
+        return Microfacet(4.0 * lobe.ks, lobe.roughness, lobe.fresnel, Beckmann(), lobe.masking)
+    return lobe if isinstance(lobe, Microfacet) else None
+
+
+def ablate(empirical: AbstractBRDF, microfacet: AbstractBRDF, values: Values) -> Ablation | None:
+    """How far the distance falls when the microfacet model loses its terms; None where it has none to lose.
+
+    Args:
+        empirical: Its shapes and static choices.
+        microfacet: The same.
+        values: Parameters of both, the best fits first, then draws.
+    """
+    if not can_ablate(microfacet):
+        return None
+    vectors = jnp.asarray(values[0]), jnp.asarray(values[1])
+    squares, norm = (np.asarray(part) for part in _squares(empirical, microfacet, vectors))
+
+    def falls(weight: np.ndarray) -> np.ndarray:
+        """Of every draw and term, over incidences weighted by the columns of a matrix."""
+        distance = np.sqrt(squares @ weight)
+        return 1.0 - distance[:, 1:] / np.maximum(distance[:, :1], 1e-300)
+
+    each = falls(np.eye(len(ANGLES)))
+    light, far = np.cos(ANGLES) * np.sin(ANGLES), np.deg2rad(GRAZING_DEG) < ANGLES
+    near, grazing = (falls((light * part)[:, None])[..., 0] for part in (~far, far))
+    return Ablation(
+        theta_i=ANGLES,
+        distance=band(np.sqrt(squares[:, 0] / norm)),
+        fall={term: band(each[:, k]) for k, term in enumerate(TERMS)},
+        near={term: estimate(near[:, k]) for k, term in enumerate(TERMS)},
+        grazing={term: estimate(grazing[:, k]) for k, term in enumerate(TERMS)},
+    )
+
+
+@eqx.filter_jit
+def _squares(
+    empirical: AbstractBRDF, microfacet: AbstractBRDF, values: tuple[Array, Array]
+) -> tuple[Float[Array, "d t k"], Float[Array, "d k"]]:
+    """∫ (f_P − f)² c_o of the whole microfacet model and without each term, and ∫ f_M² c_o, channel means."""
+    isotropic = surface(empirical).isotropic and surface(microfacet).isotropic
+    turns = jnp.zeros(1) if isotropic else (jnp.arange(AZIMUTHS) + 0.5) * jnp.pi / AZIMUTHS
+
+    def at(theta: Array, phi: Array, p: AbstractBRDF, others: list[AbstractBRDF]) -> tuple[Array, Array]:
+        width = jnp.minimum(p.width(), others[0].width())
+        rule = lobe_rule(theta, width, phi_i=None if isotropic else phi, nodes=NODES)
+        f, *rest = (jax.vmap(lambda wo, g=g: jnp.atleast_1d(g(rule.wi, wo)))(rule.wo) for g in (p, *others))
+        return jnp.stack([(rule.weight @ (f - g) ** 2).mean() for g in rest]), (rule.weight @ rest[0] ** 2).mean()
+
+    def pair(both: tuple[Array, Array]) -> tuple[Array, Array]:
+        p, m = (surface(with_vector(f, v)) for f, v in zip((empirical, microfacet), both, strict=True))
+        others = [m, *(ablated(m, term) for term in TERMS)]
+        every = jax.vmap(lambda phi: jax.vmap(lambda theta: at(theta, phi, p, others))(jnp.asarray(ANGLES)))(turns)
+        squares, norm = (part.mean(axis=0) for part in every)
+        return squares.T, norm
+
+    return jax.lax.map(pair, values)

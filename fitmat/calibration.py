@@ -1,0 +1,231 @@
+"""Calibration of the inference by simulation: are 95 % intervals right 95 times in 100?
+
+Talts, Betancourt, Simpson, Vehtari & Gelman, "Validating Bayesian Inference Algorithms with Simulation-Based
+Calibration", arXiv:1804.06788 (2018): where truths are drawn from the prior and data from the likelihood, the rank of
+the truth among posterior draws is uniform, whatever the data. It judges the program, not a model: whether real
+materials obey the model is another question.
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from typing import Literal
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Bool, Float, Int
+from scipy.stats import binomtest
+
+from fitmat.approximation import laplace
+from fitmat.brdf import AbstractBRDF, evaluate, evaluate_pairs, model
+from fitmat.errors import FitmatError
+from fitmat.fitting import fit
+from fitmat.instrument import IDEAL
+from fitmat.likelihood import Data, log_likelihood, mapped
+from fitmat.measurement import Measurements
+from fitmat.outcome import free_places
+from fitmat.params import entries, vector, with_vector
+from fitmat.posterior import Posterior
+from fitmat.priors import DISCREPANCY, draw, prepared
+from fitmat.stabilising import from_stabilised, stabilised
+from fitmat.uncertainty import sample
+from fitmat.uniformity import p_values
+
+DRAWS = 99
+"""L, draws among which the truth is ranked: far fewer than a posterior's effective ones, so hardly dependent."""
+
+LEVELS = (0.5, 0.68, 0.95)
+"""Credible intervals whose coverage is counted."""
+
+FAMILY = 0.05
+"""Probability that a right program fails in any of the quantities of one calibration (Holm 1979)."""
+
+LOG_LIKELIHOOD = "log-likelihood"
+"""A quantity beside the parameters; it notices what ranks of single parameters cannot (Modrák et al. 2023)."""
+
+Priors = Mapping[str, tuple[ArrayLike, ArrayLike]]
+Progress = Callable[[int, int], None]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Calibration:
+    """Where the truths of n simulations lay in their posteriors.
+
+    Attributes:
+        model: The model's name.
+        method: "laplace" or "emcee".
+        quantities: Names of the free parameters, `DISCREPANCY` and `LOG_LIKELIHOOD`, (q,).
+        ranks: How many of `DRAWS` posterior draws lie below the truth, (n, q).
+        covered: Whether the central interval of each of `LEVELS` holds the truth, (n, levels, q − 1); a log-likelihood
+            has none.
+        trusted: Whether the posterior itself says that its draws follow the density, (n,). It says so from the data
+            alone, so that the ranks of those are uniform, too; only they are judged.
+    """
+
+    model: str
+    method: str
+    quantities: tuple[str, ...]
+    ranks: Int[np.ndarray, "n q"]
+    covered: Bool[np.ndarray, "n levels q-1"]
+    trusted: Bool[np.ndarray, " n"]
+
+    def coverage(self) -> Float[np.ndarray, "levels q-1"]:
+        """Fraction of trusted posteriors whose interval holds the truth."""
+        return self.covered[self.trusted].mean(axis=0)
+
+    def p_values(self) -> Float[np.ndarray, " q"]:
+        """Of the uniformity of the ranks of each quantity (`uniformity.p_values`)."""
+        return p_values(self.ranks[self.trusted], DRAWS)
+
+    def faults(self, family: float = FAMILY) -> tuple[str, ...]:
+        """Quantities whose ranks are not uniform, a right program having any with probability `family` at most."""
+        return tuple(self.quantities[k] for k in rejected(self.p_values(), family))
+
+    @property
+    def words(self) -> str:
+        """What came out, in sentences."""
+        count, smallest = int(self.trusted.sum()), float(self.p_values().min())
+        if faults := self.faults():
+            told = f"NOT calibrated: the posterior is wrong in {', '.join(faults)}"
+        else:
+            told = "the intervals are as sure as they say, as far as so many simulations can tell"
+        share = ", ".join(
+            f"{100 * part:.0f} % in {100 * low:.1f} – {100 * high:.1f} %"
+            for part, low, high in zip(LEVELS, self.coverage().min(axis=1), self.coverage().max(axis=1), strict=True)
+        )
+        return (
+            f"{self.model}, {self.method}: {told}. Intervals of {share} of {count} simulations held the truth; "
+            f"smallest p of {len(self.quantities)} tests of uniformity {smallest:.2g}, family-wise level {FAMILY:g}; "
+            f"{len(self.trusted) - count} posteriors that do not trust themselves left out."
+        )
+
+
+def rejected(p: Float[np.ndarray, " q"], family: float) -> list[int]:
+    """Which hypotheses fall under Holm's step-down procedure (1979), most improbable first.
+
+    Args:
+        p: p-values.
+        family: Probability of any wrong rejection.
+    """
+    order = np.argsort(p)
+    falls = p[order] <= family / (len(p) - np.arange(len(p)))
+    return order[: len(p) if falls.all() else int(np.argmin(falls))].tolist()
+
+
+def coverage_limits(count: int, hits: int) -> tuple[float, float]:
+    """95 % limits of the coverage of which `hits` of `count` were found (Clopper & Pearson 1934)."""
+    found = binomtest(hits, count).proportion_ci(0.95, method="exact")
+    return float(found.low), float(found.high)
+
+
+def calibrate(
+    name: str,
+    geometry: Measurements,
+    noise: tuple[float, float],
+    priors: Priors,
+    *,
+    simulations: int,
+    seed: int,
+    method: Literal["laplace", "emcee"] = "laplace",
+    told: float = 1.0,
+    progress: Progress | None = None,
+) -> Calibration:
+    """Simulate truths and data, fit them, and rank the truths among posterior draws.
+
+    Args:
+        name: Model name.
+        geometry: Where to measure; its values do not count.
+        noise: Fraction of the value that the prior's centre has, and floor in sr⁻¹. σ is the same for all truths: if
+            it followed each, it would tell of the truth what no likelihood uses.
+        priors: As for `fit`; of the discrepancy as well.
+        simulations: n.
+        seed: Of everything.
+        method: How posteriors are drawn: `laplace`, corrected, or `sample`.
+        told: Multiple of the true σ that the fit is told; anything but 1 is a planted fault.
+        progress: Called with simulations done and n.
+
+    Returns:
+        A `Calibration`.
+
+    Raises:
+        FitmatError: the discrepancy has no prior, or a fit is not finite.
+    """
+    rng = np.random.default_rng(seed)
+    template = _centre(model(name, channels=len(geometry.channels)), priors)
+    sigma = np.hypot(noise[1], noise[0] * evaluate(template, geometry.wi, geometry.wo))
+    free, prior = free_places(template, {}), prepared(template, IDEAL, priors)
+    values, s = draw(template, prior, free, simulations, rng)
+    kappa, normal = geometry.wi[:, 2:3], rng.normal(size=(simulations, *sigma.shape))
+    where = tuple(jnp.asarray(part) for part in (geometry.wi, geometry.wo, sigma * kappa, kappa))
+    truths = (jnp.asarray(values), jnp.asarray(s), jnp.asarray(normal))
+    measured = np.asarray(_simulated(template, where, truths)) / kappa
+    plan = dataclasses.replace(
+        geometry, sigma=told * sigma, valid=np.ones(sigma.shape, bool), source=f"simulated {name}", instrument=IDEAL
+    )
+    found = []
+    for k in range(simulations):
+        fitted = fit(dataclasses.replace(plan, value=measured[k]), name, priors=priors)
+        if not fitted.finite:
+            raise FitmatError(f"simulation {k} of {name}: the fit ended {fitted.result}.")
+        number = int(rng.integers(2**31))
+        posterior = sample(fitted, seed=number) if method == "emcee" else laplace(fitted, seed=number)
+        found.append(_placed(posterior, values[k], s[k]))
+        if progress is not None:
+            progress(k + 1, simulations)
+    ranks, covered, trusted = (np.stack(part) for part in zip(*found, strict=True))
+    return Calibration(name, method, _quantities(template), ranks, covered, trusted)
+
+
+def join(parts: Sequence[Calibration]) -> Calibration:
+    """Calibrations of one model and method as one: ranks are uniform whatever the geometry and the noise."""
+    ranks, covered, trusted = (
+        np.concatenate([getattr(part, field) for part in parts]) for field in ("ranks", "covered", "trusted")
+    )
+    return dataclasses.replace(parts[0], ranks=ranks, covered=covered, trusted=trusted)
+
+
+def _centre(template: AbstractBRDF, priors: Priors) -> AbstractBRDF:
+    """The model at the centre of the priors."""
+    values = np.array(vector(template))
+    for entry in entries(template):
+        if entry.name in priors:
+            values[entry.place] = priors[entry.name][0]
+    return with_vector(template, jnp.asarray(values))
+
+
+def _quantities(template: AbstractBRDF) -> tuple[str, ...]:
+    names = [e.name if e.size == 1 else f"{e.name} {k + 1}" for e in entries(template) for k in range(e.size)]
+    return (*names, DISCREPANCY, LOG_LIKELIHOOD)
+
+
+@eqx.filter_jit
+def _simulated(
+    template: AbstractBRDF, where: tuple[Array, ...], truths: tuple[Array, Array, Array]
+) -> Float[Array, "m n c"]:
+    """y κ of every truth, as the likelihood says: z(y κ) = z(f κ) + N(0, 1)."""
+    wi, wo, noise, kappa = where
+
+    def one(item: tuple[Array, Array, Array]) -> Array:
+        value, s, e = item
+        exact = evaluate_pairs(with_vector(template, value), wi, wo) * kappa
+        return from_stabilised(stabilised(exact, noise, s) + e, noise, s)
+
+    return jax.lax.map(one, truths)
+
+
+def _placed(posterior: Posterior, truth: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray, np.bool_]:
+    """Ranks (q,), coverage (levels, q − 1) and trust of one posterior."""
+    every = np.column_stack([posterior.values, posterior.discrepancy])
+    few, true = np.column_stack(posterior.thinned(DRAWS)), np.append(truth, s)
+    likelihood = np.asarray(
+        _log_likelihoods(posterior.fit.model, posterior.fit.data, jnp.asarray(np.vstack([true, few])))
+    )
+    below = np.append((few < true).sum(axis=0), (likelihood[1:] < likelihood[0]).sum())
+    ends = [np.quantile(every, [(1 - level) / 2, (1 + level) / 2], axis=0) for level in LEVELS]
+    return below, np.stack([(low <= true) & (true <= high) for low, high in ends]), np.bool_(posterior.exact)
+
+
+@eqx.filter_jit
+def _log_likelihoods(template: AbstractBRDF, data: Data, points: Array) -> Float[Array, " m"]:
+    return mapped(lambda x: log_likelihood(with_vector(template, x[:-1]), data, x[-1]), points)

@@ -1,0 +1,120 @@
+"""Cross-validation: how well a fit to all other incidences predicts the one that was left out.
+
+It says nothing of which model is better; `choice` does. A large file is not refitted.
+"""
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from fitmat.brdf import AbstractBRDF, evaluate_pairs
+from fitmat.fitting import _refine
+from fitmat.incidences import incidences
+from fitmat.likelihood import Data, first_discrepancy, mapped, residuals
+from fitmat.outcome import Fit
+from fitmat.params import with_vector
+
+MOST_REFITTED = 50_000
+"""Values above which nothing is refitted."""
+
+MAX_STEPS = 256
+"""Iterations of each refit, as many as `fitting.fit` allows, so that its compiled program serves."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class LeftOut:
+    """Prediction errors of incidences that the fit had not seen; arrays hold one entry for each, (k,).
+
+    Attributes:
+        names: The incidences, "60°".
+        theta_i_deg: Their angles in degrees.
+        cube_root: Rms of ∛(y cosθ_i) − ∛(f cosθ_i) in sr^(−1/3).
+        z: Rms residual in the standard deviations that the others' noise and misfit promise: 1 where the prediction
+            is as good as promised; NaN where the loss promises nothing.
+        values: How many values were predicted.
+        settled: Whether the refit converged.
+    """
+
+    names: tuple[str, ...]
+    theta_i_deg: np.ndarray
+    cube_root: np.ndarray
+    z: np.ndarray
+    values: np.ndarray
+    settled: np.ndarray
+
+    @property
+    def error(self) -> float:
+        """Rms of `cube_root` over all values, sr^(−1/3)."""
+        return float(np.sqrt(np.sum(self.values * self.cube_root**2) / self.values.sum()))
+
+    @property
+    def surprise(self) -> float:
+        """Rms of `z` over all values."""
+        return float(np.sqrt(np.sum(self.values * self.z**2) / self.values.sum()))
+
+    @property
+    def worst(self) -> str:
+        """The incidence that is predicted worst, in its own standard deviations."""
+        return self.names[int(np.argmax(np.nan_to_num(self.z)))]
+
+
+def leave_incidences_out(fit: Fit) -> LeftOut | None:
+    """Refit without each incidence in turn, from the optimum of all, and predict it.
+
+    Left-out values have weight 0, so that the program that fitted all serves for each. Where there are many angles,
+    neighbouring ones are left out together.
+
+    Args:
+        fit: A fit that is finite.
+
+    Returns:
+        The errors; None for a single incidence, where nothing would be left, for what is not finite, and above
+        `MOST_REFITTED` values.
+    """
+    data = fit.data
+    used = np.asarray(data.weight)
+    groups = incidences(np.asarray(data.wi), np.asarray((used > 0).any(axis=1)))
+    if len(groups) < 2 or not fit.finite or fit.n_values > MOST_REFITTED:
+        return None
+    left = np.zeros((len(groups), *used.shape))
+    for k, group in enumerate(groups):
+        left[k, group.rows] = used[group.rows]
+    values, s, settled = _refitted(fit, used - left)
+    found = _errors(fit.model, data, jnp.asarray(values), jnp.asarray(s), jnp.asarray(left))
+    cube, z = (np.sqrt(np.asarray(part)) for part in found)
+    promised = fit.loss.posterior
+    angles = np.array([g.theta_i_deg for g in groups])
+    count = left.sum(axis=(1, 2))
+    return LeftOut(tuple(g.name for g in groups), angles, cube, z if promised else z * np.nan, count, settled)
+
+
+def _refitted(fit: Fit, weights: Float[np.ndarray, "k n c"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Parameters (k, p), s and convergence of the fits under other weights."""
+    starts = jnp.asarray(np.tile(fit.values, (fit.n_starts, 1)))
+    first, free = first_discrepancy(fit.data), tuple(int(k) for k in fit.free)
+    found = []
+    for weight in weights:
+        data = eqx.tree_at(lambda d: d.weight, fit.data, jnp.asarray(weight))
+        ends = jax.device_get(_refine(fit.model, data, starts, first, free, MAX_STEPS))
+        best = int(np.argmax(np.nan_to_num(ends.log_likelihood, nan=-np.inf)))
+        found.append((ends.values[best], ends.discrepancy[best], ends.solved[best]))
+    values, s, settled = (np.array(column) for column in zip(*found, strict=True))
+    return values, s, settled
+
+
+@eqx.filter_jit
+def _errors(template: AbstractBRDF, data: Data, values: Array, s: Array, left: Array) -> tuple[Array, Array]:
+    """Mean squares, over what each was not fitted to, of the cube-root error and of the residual, (k,) each."""
+
+    def one(fold: tuple[Array, Array, Array]) -> tuple[Array, Array]:
+        model, weight = with_vector(template, fold[0]), fold[2]
+        predicted = evaluate_pairs(model, data.wi, data.wo) * data.kappa
+        cube = weight * (jnp.cbrt(data.x) - jnp.cbrt(predicted)) ** 2
+        z = weight * residuals(model, data, fold[1]) ** 2
+        return jnp.sum(cube) / jnp.sum(weight), jnp.sum(z) / jnp.sum(weight)
+
+    return mapped(one, (values, s, left))  # pyright: ignore[reportArgumentType]

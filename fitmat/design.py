@@ -1,0 +1,334 @@
+"""Designs: which next measurement would tell most about a parameter, about all, or about which of two models is right.
+
+It measures nothing and refits nothing: what it expects holds where the model does, with s as the fit found it.
+
+Each candidate is put to a bank of Kalman filters, one for each Gaussian of the `ridge` (the Gaussian sum of Alspach &
+Sorenson, IEEE Trans. Automatic Control 17, 1972), with several points of the ridge taken for the truth in turn. What
+is expected is averaged over these truths (Chaloner & Verdinelli, Statistical Science 10, 1995): one point would be
+blind where a parameter is not determined, and random draws would miss what a narrow ridge becomes.
+"""
+
+import dataclasses
+from typing import Any, Literal
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from fitmat.brdf import AbstractBRDF
+from fitmat.candidates import Candidates, Kind, Limits, proposed
+from fitmat.errors import FitmatError
+from fitmat.likelihood import mapped
+from fitmat.losses import Loss
+from fitmat.noise import noise_law
+from fitmat.outcome import Fit
+from fitmat.params import space, with_vector
+from fitmat.posterior import Posterior
+from fitmat.profile_likelihood import free_names, profiles
+from fitmat.ridge import Ridge, ridge
+
+TRUTHS = 16
+"""Points of the ridge that are taken for the truth, equally likely."""
+
+APART = 4.9
+"""Proposals differ by more than this, in degrees; to take one again there are repeats."""
+
+MATCH = "match"
+"""The target that asks which of two models is right."""
+
+
+MOST_STEPS = 8
+"""So many measurements are planned at most: all steps share one program."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Proposal:
+    """One next measurement.
+
+    Attributes:
+        theta_i: Incidence, radians.
+        phi_i: Its azimuth, radians.
+        theta_o: Signed, positive on the mirror side of the azimuth `phi`, radians, (m,).
+        phi: Relative azimuth of positive theta_o, radians; π is the plane of incidence.
+        repeats: How often each sample is taken.
+        gain: By which factor the standard deviation shrinks in this step (the geometric mean over all combinations of
+            parameters, or over the channels of one); for "match" how far the models are apart there, in standard
+            deviations of what the worse of them predicts.
+        sd: Of each free parameter after this step and those before it, natural, (f,).
+        sd_if: The same for each truth, (t, f).
+    """
+
+    theta_i: float
+    phi_i: float
+    theta_o: Float[np.ndarray, " m"]
+    phi: float
+    repeats: int
+    gain: float
+    sd: Float[np.ndarray, " f"]
+    sd_if: Float[np.ndarray, "t f"]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Design:
+    """The next measurements of a fitted material, the best first, each given those before it.
+
+    Attributes:
+        fit: What is known so far.
+        rival: The other model, where the target is "match"; else None.
+        target: Name of a parameter, "match", or None for all parameters.
+        kind: "sample" or "curve".
+        names: Of the free parameters, (f,).
+        sd: Of each before any new measurement, natural (of ln p where the scale is log), (f,).
+        truths: Free parameters, natural, that were taken for the truth in turn, (t, f).
+        proposals: At least one.
+        candidates: What was looked at.
+        gains: Of each candidate as the first measurement, as `Proposal.gain`, (k,).
+    """
+
+    fit: Fit
+    rival: Fit | None
+    target: str | None
+    kind: Kind
+    names: tuple[str, ...]
+    sd: Float[np.ndarray, " f"]
+    truths: Float[np.ndarray, "t f"]
+    proposals: tuple[Proposal, ...]
+    candidates: Candidates
+    gains: Float[np.ndarray, " k"]
+
+
+def next_angles(
+    posterior: Posterior,
+    *,
+    target: str | None = None,
+    against: Posterior | None = None,
+    kind: Literal["sample", "curve"] = "sample",
+    count: int = 5,
+    repeats: int = 1,
+    limits: Limits | None = None,
+) -> Design:
+    """The next measurements that would shrink a parameter's standard deviation most, chosen one after the other.
+
+    The noise of a candidate follows the law σ² = a² + (b f)² of the file, and the fit's discrepancy adds to it as it
+    does in the fit. For one parameter the expected variance is minimised, for all of them the expected ln of the
+    determinant of their covariance (Bayesian D-optimality). For "match" the expected squared difference of the two
+    models is maximised, over the variance of what the one with more discrepancy predicts (noise, discrepancy and
+    parameters together), as Box & Hill (Technometrics 9, 1967) weigh it, while the other counts as the truth. Repeats
+    count as independent samples, as a fit would count them.
+
+    Args:
+        posterior: Of a fit with at least one free parameter; only its fit is used.
+        target: A parameter's name, "match", or None for all parameters.
+        against: The posterior of the other model, for "match".
+        kind: Whether to propose single samples or whole curves: one incidence with the theta_o of the file.
+        count: How many measurements.
+        repeats: How often each is taken.
+        limits: What the instrument cannot do.
+
+    Returns:
+        A `Design`.
+
+    Raises:
+        FitmatError: the fit is not finite or has nothing free, the target is no free parameter, "match" lacks a second
+            model, a number is below 1, or the limits leave nothing.
+
+    Example:
+        >>> next_angles(laplace(fit, seed=0), target="eta", count=2)  # doctest: +SKIP
+    """
+    fit, rival = posterior.fit, None if against is None else against.fit
+    _refuse(fit, rival, target, (count, repeats))
+    fits = (fit,) if rival is None or target != MATCH else (fit, rival)
+    looked = proposed(fit, kind, limits or Limits())
+    banks = tuple(_bank(f) for f in fits)
+    better = int(np.argmin([f.discrepancy for f in fits]))
+    match = (better, 1 - better) if target == MATCH else None
+    task = _Task(jnp.asarray(_law(fit)), jnp.asarray(float(repeats)), _wanted(fit, target), match)
+    history: list[int] = []
+    proposals: list[Proposal] = []
+    gains = np.zeros(0)
+    before, start = _expected(banks, task, looked, history, blank=True)
+    for _ in range(count):
+        score, sd = _expected(banks, task, looked, history)
+        score = np.where(looked.near(history, APART), -np.inf, score)
+        gain = np.sqrt(np.maximum(score, 0.0)) if match else np.exp(score - before)
+        best = int(np.argmax(score))
+        proposals.append(_proposal(looked, best, repeats, float(gain[best]), sd[best]))
+        gains = gains if history else gain
+        before = score[best]
+        history.append(best)
+    truths = np.asarray(banks[0].centre)[np.asarray(banks[0].truths)]
+    sd = np.sqrt(np.mean(start[0] ** 2, axis=0))
+    known = (fit, fits[-1] if match else None, target, kind, tuple(free_names(fit)), sd, truths)
+    return Design(*known, tuple(proposals), looked, gains)
+
+
+def _refuse(fit: Fit, rival: Fit | None, target: str | None, numbers: tuple[int, int]) -> None:
+    for one in (fit, *([rival] if rival else [])):
+        if not one.finite:
+            raise FitmatError(f"{one.name}: the fit ended {one.result}, there is nothing to plan from; check the data.")
+        if not len(one.free):
+            raise FitmatError(f"{one.name}: every parameter is fixed, there is nothing to determine; free one.")
+    if target == MATCH and rival is None:
+        raise FitmatError("which model is right can be asked of two only: give a second model.")
+    known = [*(e.name for e in fit.entries if e.name not in fit.held), *free_names(fit)]
+    if target not in (None, MATCH, *known):
+        raise FitmatError(f"{target!r} is no free parameter of {fit.name}: expected {', '.join(dict.fromkeys(known))}.")
+    if min(numbers) < 1 or numbers[0] > MOST_STEPS:
+        raise FitmatError(f"count {numbers[0]}, repeats {numbers[1]}: expected 1 to {MOST_STEPS}, and at least 1.")
+
+
+def _wanted(fit: Fit, target: str | None) -> tuple[int, ...]:
+    """Places of the target among the free parameters, every channel of it; () for all together."""
+    owner = [e.name for e in fit.entries if e.name not in fit.held for _ in range(e.size)]
+    return tuple(k for k, names in enumerate(zip(owner, free_names(fit), strict=True)) if target in names)
+
+
+class _Bank(eqx.Module):
+    """A ridge for compiled programs: its Gaussians, the model they belong to, and which centres serve as truths."""
+
+    template: AbstractBRDF
+    base: Array
+    places: tuple[int, ...] = eqx.field(static=True)
+    loss: Loss = eqx.field(static=True)
+    s: Array
+    logs: Array
+    centre: Array
+    covariance: Array
+    truths: Array
+
+    def predicted(self, t: Array, wi: Array, wo: Array) -> Array:
+        """f κ at the natural coordinates t, (c,)."""
+        whole = space(self.template)
+        full = whole.natural(self.base).at[np.array(self.places)].set(t)
+        return jnp.atleast_1d(with_vector(self.template, whole.physical(full))(wi, wo)) * wi[2]
+
+
+class _Task(eqx.Module):
+    """What candidates are judged by: the law of the noise, repeats, the places asked for, and (truth, rival)."""
+
+    law: Array
+    repeats: Array
+    wanted: tuple[int, ...] = eqx.field(static=True)
+    match: tuple[int, int] | None = eqx.field(static=True)
+
+
+def _bank(fit: Fit) -> _Bank:
+    found: Ridge = ridge(fit, profiles(fit))
+    middles = (np.arange(TRUTHS) + 0.5) / TRUTHS
+    truths = np.minimum(np.searchsorted(np.cumsum(found.weight), middles), len(found.weight) - 1)
+    arrays = (np.asarray(fit.discrepancy), np.log(found.weight + 1e-300), found.centre, found.covariance, truths)
+    places = tuple(int(k) for k in fit.free)
+    return _Bank(fit.model, jnp.asarray(fit.values), places, fit.data.loss, *(jnp.asarray(a) for a in arrays))
+
+
+def _law(fit: Fit) -> Float[np.ndarray, "2 c"]:
+    """a and b of every channel."""
+    m, sigma = fit.measurements, fit.noise.sigma
+    used = [m.valid[:, k] for k in range(len(m.channels))]
+    laws = [noise_law(m.value[u, k], sigma[u, k]) if u.any() else (1.0, 0.0) for k, u in enumerate(used)]
+    return np.array(laws).T
+
+
+def _proposal(looked: Candidates, best: int, repeats: int, gain: float, sd_if: np.ndarray) -> Proposal:
+    used = looked.used[best]
+    place = (looked.theta_i[best], looked.phi_i[best], looked.theta_o[best][used], looked.phi[best])
+    return Proposal(*place, repeats, gain, np.sqrt(np.mean(sd_if**2, axis=0)), sd_if)
+
+
+def _expected(
+    banks: tuple[_Bank, ...], task: _Task, looked: Candidates, history: list[int], *, blank: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """Score of every candidate after those of the history, (k,), and the sd it leaves for each truth, (k, t, f).
+
+    With `blank` no sample of any candidate is taken.
+    """
+    wi, wo = looked.directions()
+    past = np.zeros((MOST_STEPS, looked.used.shape[1]), bool)
+    rows = np.zeros(MOST_STEPS, int)
+    rows[: len(history)] = history
+    past[: len(history)] = looked.used[history]
+    given = (wi, wo, looked.used & (not blank)), (wi[rows], wo[rows], past)
+    score, sd = _scores(banks, task, *(tuple(jnp.asarray(p) for p in part) for part in given))
+    return np.asarray(score), np.asarray(sd)
+
+
+@eqx.filter_jit
+def _scores(banks: tuple[_Bank, ...], task: _Task, candidates: Any, history: Any) -> tuple[Array, Array]:
+    # For "match" the model that needs less discrepancy is the truth, and the other is asked how far off it is.
+    pairs = [(0, 0)] if task.match is None else [(0, 0), task.match]
+    begin = [_ready(banks[k], len(banks[0].truths)) for _, k in pairs]
+    flat = tuple(part.reshape(-1, *part.shape[2:]) for part in history)
+    known = [_taken(banks[t], banks[k], task, state, flat) for (t, k), state in zip(pairs, begin, strict=True)]
+
+    def one(candidate: Any) -> tuple[Array, Array]:
+        ends = [_taken(banks[t], banks[k], task, state, candidate) for (t, k), state in zip(pairs, known, strict=True)]
+        spread = _left(banks[0], ends[0])
+        sd = jnp.sqrt(jnp.diagonal(spread, axis1=1, axis2=2))
+        if task.match is not None:
+            apart = ends[1][3] - known[1][3]
+            return jnp.mean(apart @ jnp.exp(banks[task.match[1]].logs)), sd
+        if task.wanted:
+            return -0.5 * jnp.mean(jnp.log(jnp.mean(sd**2, axis=0)[np.array(task.wanted)])), sd
+        return -0.5 * jnp.mean(jnp.linalg.slogdet(spread)[1]) / sd.shape[1], sd
+
+    return mapped(one, candidates)
+
+
+def _ready(bank: _Bank, truths: int) -> tuple:
+    """What filters carry: ln of their weights (t, e), shifts (t, e, f), covariances (e, f, f), Σ innovation² (t, e)."""
+    logs = jnp.tile(bank.logs, (truths, 1))
+    return logs, jnp.zeros((truths, *bank.centre.shape)), bank.covariance, jnp.zeros_like(logs)
+
+
+def _taken(truth: _Bank, model: _Bank, task: _Task, state: tuple, rows: tuple) -> tuple:
+    """The filters of a model after rows of noise-free measurements of each truth, a rank-1 update for each channel."""
+
+    def row(state: tuple, given: tuple[Array, Array, Array]) -> tuple[tuple, None]:
+        wi, wo, used = given
+
+        def point(t: Array) -> tuple[Array, Array]:
+            x = model.predicted(t, wi, wo)
+            return x, x
+
+        slope, expected = jax.vmap(jax.jacfwd(point, has_aux=True))(model.centre)
+        if truth is model:
+            seen = expected[truth.truths]
+        else:
+            seen = jax.vmap(lambda t: truth.predicted(t, wi, wo))(truth.centre[truth.truths])
+        noise = jnp.hypot(task.law[0] * wi[2], task.law[1] * expected)
+        weight = jnp.where(used, jnp.sqrt(task.repeats), 0.0)
+
+        def z(x: Array) -> Array:
+            return weight * model.loss.transform(x, noise, wi[2], model.s)
+
+        here, steep = jax.jvp(z, (expected,), (jnp.ones_like(expected),))
+        slope, apart = slope * steep[..., None], z(seen[:, None]) - here
+        for channel in range(apart.shape[-1]):
+            state = _assimilated(state, slope[:, channel], apart[..., channel])
+        return state, None
+
+    return jax.lax.scan(row, state, rows)[0]
+
+
+def _assimilated(state: tuple, j: Float[Array, "e f"], apart: Float[Array, "t e"]) -> tuple:
+    """Kalman's update (Sherman & Morrison) of every filter by one datum of unit variance."""
+    logs, shift, covariance, apart_by = state
+    cj = jnp.einsum("eij,ej->ei", covariance, j)
+    variance = 1.0 + jnp.einsum("ei,ei->e", j, cj)
+    innovation = apart - jnp.einsum("tei,ei->te", shift, j)
+    logs = logs - 0.5 * innovation**2 / variance - 0.5 * jnp.log(variance)
+    shift = shift + (innovation / variance)[..., None] * cj
+    covariance = covariance - cj[:, :, None] * cj[:, None, :] / variance[:, None, None]
+    return logs, shift, covariance, apart_by + innovation**2 / variance
+
+
+def _left(bank: _Bank, state: tuple) -> Float[Array, "t f f"]:
+    """Covariance of the mixture under each truth."""
+    logs, shift, covariance, _ = state
+    weight = jax.nn.softmax(logs, axis=1)
+    at = bank.centre + shift
+    apart = at - jnp.einsum("te,tef->tf", weight, at)[:, None]
+    within = jnp.einsum("te,eij->tij", weight, covariance)
+    return within + jnp.einsum("te,tei,tej->tij", weight, apart, apart)

@@ -1,0 +1,87 @@
+"""The headline of a match: plain sentences first, numbers in them, the thresholds that chose the words beside them.
+
+It measures nothing and decides nothing that a named threshold does not.
+"""
+
+from fitmat.ablation import TERMS, Ablation
+from fitmat.estimate import Estimate
+from fitmat.regions import GRAZING_DEG
+from fitmat.telling import SEPARATED, Telling
+
+CLOSE, SIMILAR = 0.1, 0.3
+"""Hemisphere distances up to which the verdict says "hardly differ" and "differ moderately"."""
+
+STRONG_EVIDENCE = 10.0
+"""ΔBIC from which the data clearly prefer one model (Kass & Raftery 1995: "very strong")."""
+
+MENTIONED = 0.05
+"""A loss or gain beyond `regions.GRAZING_DEG` is mentioned from this fraction on, where its interval excludes 0."""
+
+Names = tuple[str, str]
+"""Of the empirical and the microfacet lobe."""
+
+
+def distance_sentence(names: Names, distance: Estimate) -> str:
+    """How far apart the two are over the hemisphere."""
+    highest = distance.ci95[1]
+    words = "hardly differ" if highest < CLOSE else "differ moderately" if highest < SIMILAR else "differ strongly"
+    low, high = (100 * x for x in distance.ci95)
+    return (
+        f"{names[0]} and {names[1]} {words}: {100 * distance.value:.0f} % apart over the hemisphere "
+        f"(95 % interval {low:.0f}–{high:.0f} %)."
+    )
+
+
+def telling_sentence(names: Names, telling: Telling) -> str | None:
+    """Up to which incidence the instrument cannot tell the two apart, and what would; None where noise is unknown."""
+    if not telling.known:
+        return None
+    alike, hidden, last = telling.alike_up_to_deg, telling.hidden_up_to_deg, float(telling.theta_i_deg[-1])
+    if telling.every.value < SEPARATED:
+        times = telling.repeats_needed.value
+        return f"These measurements cannot tell them apart; that would take {_times(times)} as many readings."
+    if alike == last:
+        return "Only all incidences together tell them apart, no single one does."
+    if alike is not None:
+        return f"Up to {alike:.0f}° incidence this instrument cannot tell {names[0]} from {names[1]}, beyond it can."
+    if hidden == last:
+        return "Everywhere their difference is within the noise of a single reading, but all readings tell them apart."
+    if hidden is not None:
+        return (
+            f"Up to {hidden:.0f}° incidence their difference is within the noise of a single reading, beyond it shows."
+        )
+    return "This instrument tells them apart at every incidence measured."
+
+
+def grazing_sentence(names: Names, excess: Estimate, ablation: Ablation | None) -> str | None:
+    """How much light from grazing incidence is missing or too much, and why; None where it is little or not certain."""
+    low, high = sorted(abs(100 * x) for x in excess.ci95)
+    if abs(excess.value) < MENTIONED or excess.ci95[0] * excess.ci95[1] <= 0:
+        return None
+    side = "less" if excess.value < 0 else "more"
+    causes = ablation.causes(ablation.grazing) if ablation is not None else ()
+    why = f": it has {' and '.join(TERMS[cause] for cause in causes)}" if causes else ""
+    return (
+        f"Beyond {GRAZING_DEG:.0f}° {names[0]} reflects {abs(100 * excess.value):.0f} % {side} than {names[1]} "
+        f"({low:.0f}–{high:.0f} %){why}."
+    )
+
+
+def gap_sentence(names: Names, gap: Estimate, sign: int, theta_i_deg: float) -> str:
+    """The largest difference of the albedos and where it is."""
+    side = "less" if sign < 0 else "more"
+    return (
+        f"At {theta_i_deg:.0f}° incidence {names[0]} reflects {100 * gap.value:.1f} % of the light "
+        f"{side} than {names[1]} ({100 * gap.ci95[0]:.1f}–{100 * gap.ci95[1]:.1f} %)."
+    )
+
+
+def evidence_sentence(names: Names, delta_bic: float) -> str:
+    """Which of the two the data prefer."""
+    if abs(delta_bic) < STRONG_EVIDENCE:
+        return f"The data do not decide between them (ΔBIC {delta_bic:.0f})."
+    return f"The data clearly prefer {names[1] if delta_bic > 0 else names[0]} (ΔBIC {abs(delta_bic):.0f})."
+
+
+def _times(factor: float) -> str:
+    return f"{factor:.2g} times" if factor < 1000 else "over a thousand times"

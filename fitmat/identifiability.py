@@ -1,0 +1,188 @@
+"""Identifiability: which parameters these angles determine, which they do not, and what is determined instead.
+
+It fits no other model and proposes no measurement; `design` does.
+"""
+
+import dataclasses
+
+import numpy as np
+from jaxtyping import Float
+
+from fitmat.display import html_table, interval, text_table, with_error
+from fitmat.information import UNDETERMINED
+from fitmat.outcome import Fit
+from fitmat.params import space
+from fitmat.posterior import Posterior
+from fitmat.profile_likelihood import Profile, profiles
+from fitmat.ridge import Ridge, prior_sd, ridge
+from fitmat.trade_offs import Group, groups
+
+DRAWS = 4000
+"""Draws behind contractions and intervals."""
+
+CONTRACTED = 0.5
+"""Contraction 1 − var_post/var_prior below which a parameter is not determined: its standard deviation is more than
+0.7 of what it was before any datum."""
+
+WEAK = 0.1
+"""Standard deviation in ln p, or relative to a weight, above which a parameter is determined weakly: a tenth."""
+
+WEAK_RANGE = 0.1 * UNDETERMINED["linear"]
+"""The same for other linear parameters, angles for one, as a fraction of the range: a tenth of not determined."""
+
+SMALL_WEIGHT = 0.01
+"""Weights below this fraction of their range are judged as if they were that large: 0.001 ± 0.0005 is no question."""
+
+STATES = ("determined", "weakly determined", "not determined by these angles")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Verdict:
+    """What the data say of one parameter.
+
+    Attributes:
+        name: With its channel where there are several.
+        symbol: Its letter.
+        state: One of `STATES`.
+        value: Best fit, physical.
+        profile: Its likelihood.
+        ci95: 95 % limits of the profile likelihood, physical; a bound where it is open.
+        open: Which of them are bounds.
+        contraction: 1 − var_post/var_prior in natural coordinates; of a ridge that fills its bounds unevenly, the
+            prior's volume may contract it though no datum does, which is why the profile is asked as well.
+    """
+
+    name: str
+    symbol: str
+    state: str
+    value: float
+    profile: Profile
+    ci95: tuple[float, float]
+    open: tuple[bool, bool]
+    contraction: float
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Identifiability:
+    """What the angles of a file determine of a model.
+
+    Attributes:
+        fit: Of the model.
+        verdicts: One per free parameter.
+        spectrum: Eigenvalues of the information in units of the priors' standard deviations, rising, (f,): below 1 the
+            data say less of that direction than the bounds do.
+        groups: Parameters that trade off.
+    """
+
+    fit: Fit
+    verdicts: tuple[Verdict, ...]
+    spectrum: Float[np.ndarray, " f"]
+    groups: tuple[Group, ...]
+
+    def state(self, name: str) -> str:
+        """The state of a parameter; of several channels the worst.
+
+        Raises:
+            KeyError: no free parameter has the name.
+        """
+        found = [v.state for v in self.verdicts if v.name == name or v.name.rpartition(" ")[0] == name]
+        if not found:
+            raise KeyError(name)
+        return max(found, key=STATES.index)
+
+    @property
+    def words(self) -> str:
+        """Plain sentences: what is determined, what is not, and what of it is known all the same."""
+        if not self.verdicts:
+            return f"{self.fit.name} has no free parameter to determine."
+        parts = []
+        for state in STATES:
+            names = [v.name for v in self.verdicts if v.state == state]
+            if names:
+                parts.append(f"{_listed(names)} {'is' if len(names) == 1 else 'are'} {state}.")
+        return " ".join([*parts, *(self._traded(g) for g in self.groups)])
+
+    def _traded(self, group: Group) -> str:
+        names = _listed(list(group.names))
+        c = group.combination
+        states = [v.state for v in self.verdicts if v.name in group.names]
+        lost = all(state == STATES[2] for state in states)
+        if c is None:
+            known = all(state == STATES[0] for state in states)
+            return f"{names} trade off{', yet each is determined' if known else ''}."
+        meaning = f" ({c.meaning})" if c.meaning else ""
+        verb = "only" if lost else "best known is"
+        end = " is determined" if lost else ""
+        rows = zip(c.value, c.sd, c.ci95, strict=True)
+        numbers = "; ".join(
+            f"{with_error(float(v), float(s))} (95 % {interval(float(ci[0]), float(ci[1]), float(s))})"
+            for v, s, ci in rows
+        )
+        return f"{names} trade off: {verb} {c.name}{meaning}{end}: {numbers}."
+
+    def _rows(self) -> list[tuple[str, ...]]:
+        return [
+            (v.name, v.state, f"{v.value:.4g}", " – ".join(f"{x:.4g}" for x in v.ci95), f"{v.contraction:.3f}")
+            for v in self.verdicts
+        ]
+
+    def __str__(self) -> str:
+        """The words, then a line for each parameter."""
+        caption = f"{self.fit.name}: {self.words}"
+        return text_table(caption, self._rows()) if self.verdicts else caption
+
+    def _repr_html_(self) -> str:
+        headings = ("parameter", "state", "value", "95 % (profile)", "contraction")
+        return html_table(f"{self.fit.name}: {self.words}", headings, self._rows())
+
+
+def identify(posterior: Posterior) -> Identifiability:
+    """Say which parameters the data determine.
+
+    A parameter is not determined where its profile likelihood leaves it more room than `UNDETERMINED` or than
+    `CONTRACTED` of its prior, or where its posterior is not narrower than that; else weakly where it is known to no
+    better than a tenth. Draws are those of the chain where it is usable, else those of the `ridge`: Laplace's would
+    leave a bent ridge, and a chain that did not mix has not seen all of it.
+
+    Args:
+        posterior: Of the fit.
+
+    Returns:
+        An `Identifiability`; without verdicts where nothing is free or the fit is not finite.
+    """
+    fit = posterior.fit
+    profiled = profiles(fit)
+    if not profiled:
+        return Identifiability(fit, (), np.zeros(0), ())
+    prior = prior_sd(fit)
+    draws = _draws(posterior, ridge(fit, profiled))
+    natural = space(fit.model).natural_array(draws)[:, fit.free]
+    contraction = 1.0 - natural.var(axis=0) / prior**2
+    verdicts = tuple(_verdict(fit, p, float(contraction[p.place]), float(prior[p.place])) for p in profiled)
+    known = fit.information[np.ix_(fit.free, fit.free)]
+    return Identifiability(fit, verdicts, np.linalg.eigvalsh(known * np.outer(prior, prior)), groups(fit, draws))
+
+
+def _draws(posterior: Posterior, along: Ridge) -> np.ndarray:
+    sampled = posterior.method != "laplace" and posterior.usable
+    return posterior.thinned(DRAWS)[0] if sampled else along.draws(DRAWS, seed=0)
+
+
+def _verdict(fit: Fit, profile: Profile, contraction: float, prior: float) -> Verdict:
+    k = int(fit.free[profile.place])
+    entry = next(e for e in fit.entries if e.place.start <= k < e.place.stop)
+    log, span = entry.param.scale == "log", entry.param.upper - entry.param.lower
+    value = float(fit.values[k])
+    low, high = (float(np.exp(x)) if log else float(x) for x in profile.interval)
+    lost = profile.sd > (UNDETERMINED["log"] if log else UNDETERMINED["linear"] * span)
+    lost = lost or min(contraction, 1.0 - (profile.sd / prior) ** 2) < CONTRACTED
+    if log or entry.param.weight:
+        weak = profile.sd / (1.0 if log else max(abs(value), SMALL_WEIGHT * span)) > WEAK
+    else:
+        weak = profile.sd > WEAK_RANGE * span
+    state = STATES[2] if lost else STATES[1] if weak else STATES[0]
+    return Verdict(profile.name, entry.param.symbol, state, value, profile, (low, high), profile.open, contraction)
+
+
+def _listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -1,0 +1,57 @@
+"""Incidences: which samples were lit from the same angle, for whatever is told angle by angle.
+
+Only directions count here; values, noise and models do not.
+"""
+
+import dataclasses
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from fitmat.geometry import zenith
+
+MOST = 12
+"""More angles than this are taken together, neighbours first, to so many groups."""
+
+SAME_DEG = 0.1
+"""Angles that agree to this are one."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Incidence:
+    """Samples lit from one angle, or from a few neighbouring ones.
+
+    Attributes:
+        name: "60°", or "10–20°" where angles are taken together.
+        theta_i_deg: Their mean angle in degrees.
+        rows: Which samples, (k,).
+    """
+
+    name: str
+    theta_i_deg: float
+    rows: np.ndarray
+
+
+def incidences(wi: Float[np.ndarray, "n 3"], used: Bool[np.ndarray, " n"], most: int = MOST) -> tuple[Incidence, ...]:
+    """The samples by angle of incidence, rising.
+
+    Args:
+        wi: Unit vectors to the light, (n, 3).
+        used: Which samples count, (n,).
+        most: At most so many groups.
+
+    Example:
+        >>> import numpy as np
+        >>> [i.name for i in incidences(np.array([[0.0, 0, 1], [0.6, 0, 0.8]]), np.array([True, True]))]
+        ['0°', '36.9°']
+    """
+    rows = np.flatnonzero(used)
+    step = np.round(np.rad2deg(zenith(wi))[rows] / SAME_DEG).astype(int)
+    found = []
+    angles = np.unique(step)
+    for group in np.array_split(angles, min(most, len(angles))) if len(angles) else []:
+        ends = SAME_DEG * group[0], SAME_DEG * group[-1]
+        name = f"{ends[0]:.4g}°" if len(group) == 1 else f"{ends[0]:.4g}–{ends[1]:.4g}°"
+        inside = (step >= group[0]) & (step <= group[-1])
+        found.append(Incidence(name, float(SAME_DEG * step[inside].mean()), rows[inside]))
+    return tuple(found)

@@ -1,0 +1,273 @@
+"""A second opinion on a posterior: the same density sampled by another method, Hamiltonian Monte Carlo without U-turns.
+
+It replaces no chain and decides nothing: it says whether two samplers that share no move agree. The only room that
+imports blackjax.
+"""
+
+import dataclasses
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from fitmat.apparent import Apparent, apparent
+from fitmat.approximation import draws
+from fitmat.density import log_density_at, physical
+from fitmat.display import html_table, text_table
+from fitmat.errors import FitmatError
+from fitmat.likelihood import mapped
+from fitmat.outcome import Fit
+from fitmat.params import space
+from fitmat.posterior import ENOUGH_ESS, GOOD_RHAT, Posterior
+
+AGREEING = 4.0
+"""Monte Carlo standard errors by which two numbers may differ by chance: 1 in 16,000 for a Gaussian."""
+
+TAILS = (0.025, 0.975)
+"""Probabilities of the two limits that are compared."""
+
+INSIDE = 1e-3
+"""Chains start at least this fraction of a parameter's range away from its bounds."""
+
+DIVERGING = 0.01
+"""Share of divergent steps (Betancourt 2017, sec. 6.2) from which the second sampler is not relied on."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Agreement:
+    """One number that was sampled twice; arrays hold its mean and its lower and upper 95 % limit.
+
+    Attributes:
+        name: Of the parameter, with its channel.
+        first: By the posterior's own chain, physical units, (3,).
+        second: By NUTS, (3,).
+        error: Monte Carlo standard errors of their differences, (3,).
+        sd: Standard deviation of the parameter.
+    """
+
+    name: str
+    first: Float[np.ndarray, "3"]
+    second: Float[np.ndarray, "3"]
+    error: Float[np.ndarray, "3"]
+    sd: float
+
+    @property
+    def distance(self) -> Float[np.ndarray, "3"]:
+        """The differences in Monte Carlo standard errors, (3,)."""
+        return np.abs(self.first - self.second) / np.maximum(self.error, 1e-300)
+
+    @property
+    def agrees(self) -> bool:
+        """Whether chance explains all three differences."""
+        return bool((self.distance <= AGREEING).all())
+
+    @property
+    def words(self) -> str:
+        """What differs most and by how much, or "agree"."""
+        if self.agrees:
+            return "agree"
+        worst = int(np.argmax(self.distance))
+        what = ("mean", "lower limit", "upper limit")[worst]
+        apart = abs(self.first[worst] - self.second[worst]) / self.sd
+        return f"disagree: the {what} differs by {apart:.2g} standard deviations"
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SecondOpinion:
+    """What NUTS says of a posterior.
+
+    Attributes:
+        posterior: Which was checked.
+        agreements: One for each free parameter and channel, s last.
+        rhat: Largest rank-normalised split-R̂ of NUTS (Vehtari et al. 2021).
+        ess: Smallest effective number of its draws, in the bulk or the tails.
+        diverging: Share of its steps that diverged.
+    """
+
+    posterior: Posterior
+    agreements: tuple[Agreement, ...]
+    rhat: float
+    ess: float
+    diverging: float
+
+    @property
+    def verdict(self) -> str:
+        """One of "agree", "disagree", and "unsure" where the second sampler did not converge."""
+        if not (self.rhat <= GOOD_RHAT and self.ess >= ENOUGH_ESS and self.diverging <= DIVERGING):
+            return "unsure"
+        return "agree" if all(a.agrees for a in self.agreements) else "disagree"
+
+    @property
+    def words(self) -> str:
+        """The verdict in a sentence or two."""
+        name = self.posterior.fit.name
+        if self.verdict == "unsure":
+            return (
+                f"{name}: no second opinion, the second sampler did not converge (R̂ {self.rhat:.2f}, "
+                f"{self.ess:.0f} effective draws, {100 * self.diverging:.1f} % divergent)."
+            )
+        if self.verdict == "agree":
+            return f"{name}: two samplers that share no move agree on all means and 95 % limits."
+        apart = "; ".join(f"{a.name}: {a.words}" for a in self.agreements if not a.agrees)
+        return f"{name}: two samplers do not agree ({apart}). Run the chains longer before relying on the intervals."
+
+    def _rows(self) -> list[tuple[str, ...]]:
+        return [
+            (a.name, *(f"{x:.4g} / {y:.4g}" for x, y in zip(a.first, a.second, strict=True)), a.words)
+            for a in self.agreements
+        ]
+
+    def __str__(self) -> str:
+        """The verdict, then each mean and limit by both samplers."""
+        return text_table(self.words, self._rows())
+
+    def _repr_html_(self) -> str:
+        return html_table(self.words, ("parameter", "mean", "2.5 %", "97.5 %", "verdict"), self._rows())
+
+
+def check_posterior(
+    posterior: Posterior, *, seed: int, chains: int = 4, warmup: int = 500, count: int = 1000
+) -> SecondOpinion:
+    """Sample a posterior again by NUTS (Hoffman & Gelman, JMLR 15, 2014) and compare.
+
+    The density is the one that was sampled, in unbounded coordinates: u = logit of where a natural coordinate lies
+    between its bounds, and ln s, with the logarithm of the Jacobian. Step size and a dense mass matrix are adapted in
+    windows as in Stan. Errors are Monte Carlo standard errors of means and quantiles (Vehtari, Gelman, Simpson,
+    Carpenter & Bürkner 2021, Bayesian Analysis 16), walkers counting as chains.
+
+    Args:
+        posterior: From `uncertainty.sample`.
+        seed: Of starts and moves.
+        chains: Chains of NUTS, each from a draw of Laplace's approximation.
+        warmup: Steps of each that adapt and are left out.
+        count: Draws of each that are kept.
+
+    Raises:
+        FitmatError: the posterior holds no chain.
+    """
+    if posterior.chain is None:
+        raise FitmatError(
+            f"{posterior.fit.name}: was not sampled, so that there is no chain to check; sample it first."
+        )
+    found, diverged = _sampled(posterior.fit, seed, chains, warmup, count)
+    return compare_chains(posterior, found, diverging=float(np.mean(diverged)))
+
+
+def compare_chains(
+    posterior: Posterior, other: Float[np.ndarray, "chains draws d"], *, diverging: float = 0.0
+) -> SecondOpinion:
+    """Means and limits of a sampled posterior beside those of other chains of free parameters and s, physical.
+
+    Raises:
+        FitmatError: the posterior holds no chain.
+    """
+    from arviz_stats.base.array import array_stats
+
+    if posterior.chain is None:
+        raise FitmatError(f"{posterior.fit.name}: was not sampled, so that there is no chain to compare.")
+    own = np.swapaxes(posterior.chain, 0, 1)
+    agreements = []
+    for k, name in enumerate(_names(posterior.fit)):
+        (first, one), (second, two) = (_summary(part[..., k]) for part in (own, other))
+        agreements.append(Agreement(name, first, second, np.hypot(one, two), float(own[..., k].std())))
+    parts = [other[..., k] for k in range(len(agreements))]
+    return SecondOpinion(
+        posterior,
+        tuple(agreements),
+        rhat=max(float(np.asarray(array_stats.rhat(part))) for part in parts),
+        ess=min(float(np.min(_effective(part))) for part in parts),
+        diverging=diverging,
+    )
+
+
+def _effective(chains: Float[np.ndarray, "chains draws"]) -> np.ndarray:
+    """Effective draws in the bulk, and for the limits."""
+    from arviz_stats.base.array import array_stats
+
+    return np.array([array_stats.ess(chains), array_stats.ess(chains, method="tail", prob=TAILS)], float)
+
+
+def _summary(chains: Float[np.ndarray, "chains draws"]) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and both limits, (3,), and their Monte Carlo standard errors, (3,)."""
+    from arviz_stats.base.array import array_stats
+
+    errors = [array_stats.mcse(chains, method="mean")]
+    errors += [array_stats.mcse(chains, method="quantile", prob=tail) for tail in TAILS]
+    return np.append(chains.mean(), np.quantile(chains, TAILS)), np.array(errors, float)
+
+
+def _names(fit: Fit) -> list[str]:
+    """Of the free parameters, with their channels, then of s where it is inferred."""
+    channels = fit.measurements.channels
+    free = [e for e in fit.entries if e.name not in fit.held]
+    several = len(channels) > 1
+    named = [f"{e.name} {channels[k]}" if e.shape and several else e.name for e in free for k in range(e.size)]
+    return [*named, "discrepancy"] if fit.loss.infers_discrepancy else named
+
+
+def _sampled(fit: Fit, seed: int, chains: int, warmup: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Chains of free parameters and s, physical, (chains, count, free + 1), and which steps diverged."""
+    rng = np.random.default_rng(seed)
+    whole, free, where = space(fit.model), fit.free, apparent(fit)
+    low, high = whole.natural_lower[free], whole.natural_upper[free]
+    start = where.natural_array(draws(fit, chains, rng))
+    inside = np.clip((start[:, :-1] - low) / (high - low), INSIDE, 1.0 - INSIDE)
+    least = 1e-3 * max(float(np.median(start[:, -1])), 1e-12)
+    begin = np.column_stack([np.log(inside / (1.0 - inside)), np.log(np.maximum(start[:, -1], least))])
+    keys = jax.random.split(jax.random.key(int(rng.integers(2**31))), chains)
+    arrays, static = eqx.partition((fit.model, fit.data), eqx.is_array)
+    range_ = jnp.asarray(low), jnp.asarray(high)
+    places = tuple(int(k) for k in free)
+    x, diverged = _chains(arrays, static, places, where, range_, (keys, jnp.asarray(begin)), (warmup, count))
+    x = np.asarray(x)
+    values, s = physical(fit, x.reshape(-1, x.shape[-1]))
+    return np.column_stack([values[:, free], s]).reshape(x.shape), np.asarray(diverged)
+
+
+@eqx.filter_jit
+def _chains(
+    arrays: Any,
+    static: Any,
+    free: tuple[int, ...],
+    where: Apparent,
+    range_: tuple[Array, Array],
+    begin: tuple[Array, Array],
+    steps: tuple[int, int],
+) -> tuple[Array, Array]:
+    """NUTS from several starts: sampled coordinates, (chains, draws, d), and whether each step diverged."""
+    import blackjax
+
+    template, data = eqx.combine(arrays, static)
+    weights = np.array(where.weights, int)
+
+    def sampled(u: Array) -> tuple[Array, Array]:
+        """The sampled coordinates of u, and ln |∂x/∂u|."""
+        low, high = range_
+        t = low + (high - low) * jax.nn.sigmoid(u[:-1])
+        jacobian = jnp.sum(jnp.log(high - low) + jax.nn.log_sigmoid(u[:-1]) + jax.nn.log_sigmoid(-u[:-1])) + u[-1]
+        x = jnp.append(t, jnp.exp(u[-1]))
+        if not where.weights:
+            return x, jacobian
+        return x.at[weights].multiply(jnp.exp(x[where.scale])), jacobian + len(weights) * x[where.scale]
+
+    def target(u: Array) -> Array:
+        x, jacobian = sampled(u)
+        return log_density_at(template, data, free, where, x) + jacobian
+
+    def one(chain: tuple[Array, Array]) -> tuple[Array, Array]:
+        first, second = jax.random.split(chain[0])
+        adaptation = blackjax.window_adaptation(blackjax.nuts, target, is_mass_matrix_diagonal=False)
+        (state, parameters), _ = adaptation.run(first, chain[1], num_steps=steps[0])  # pyright: ignore[reportCallIssue]
+        kernel = blackjax.nuts(target, **parameters)
+
+        def step(state: Any, key: Array) -> tuple[Any, tuple[Array, Array]]:
+            info: Any
+            state, info = kernel.step(key, state)
+            return state, (sampled(state.position)[0], info.is_divergent)
+
+        return jax.lax.scan(step, state, jax.random.split(second, steps[1]))[1]
+
+    return mapped(one, begin)  # pyright: ignore[reportArgumentType]

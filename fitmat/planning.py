@@ -1,0 +1,160 @@
+"""Planning: a design as the command line shows it, with its picture.
+
+It chooses nothing itself.
+"""
+
+import io
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from fitmat.comparison import is_microfacet
+from fitmat.design import MATCH, Design, Proposal, next_angles
+from fitmat.display import plain, text_table
+from fitmat.errors import OutputError
+from fitmat.folder import write_bytes
+from fitmat.params import space
+from fitmat.posterior import Posterior
+
+PICTURES = ("png", "svg", "pdf")
+DPI = 150
+
+
+def planned(
+    posteriors: Sequence[Posterior],
+    target: str | None,
+    *,
+    kind: Literal["sample", "curve"] = "sample",
+    count: int = 5,
+    plot: Path | None = None,
+    force: bool = False,
+) -> Design:
+    """Find the next measurements and draw them.
+
+    Args:
+        posteriors: Of fits to the same measurements; planned is for the first that has the target, the microfacet
+            model first, and for "match" against the next.
+        target: A parameter, "match", or None for all parameters.
+        kind: Single samples or whole curves.
+        count: How many.
+        plot: The picture to write, or None.
+        force: Replace it where it exists.
+
+    Raises:
+        FitmatError: as `next_angles`.
+        OutputError: the picture exists and `force` is off, has no suffix of a picture, or cannot be written.
+    """
+    if plot is not None and os.path.lexists(plot) and not force:
+        raise OutputError(f"{plot}: already exists; choose another name, or --force to replace it.")
+    suffix = None if plot is None else plot.suffix.lower().removeprefix(".")
+    if suffix is not None and suffix not in PICTURES:
+        raise OutputError(f"{plot}: no picture, expected a name that ends in {', '.join(PICTURES)}. Rename it.")
+    ordered = sorted(posteriors, key=lambda p: not is_microfacet(p.fit.name))
+    having = [p for p in ordered if any(target == e.name for e in p.fit.entries)]
+    first = (having or ordered)[0]
+    against = next((p for p in ordered if p is not first), None) if target == MATCH else None
+    found = next_angles(first, target=target, against=against, kind=kind, count=count)
+    if plot is not None:
+        from matplotlib.figure import Figure
+
+        from fitmat.plots import plot_design
+
+        buffer = io.BytesIO()
+        figure = Figure(figsize=(5.6, 4.4), layout="constrained")
+        plot_design(found, ax=figure.add_subplot())
+        figure.savefig(buffer, format=suffix, dpi=DPI, bbox_inches="tight")
+        write_bytes(plot, buffer.getvalue())
+    return found
+
+
+def as_json(found: Design) -> str:
+    """The design as one JSON object; angles in degrees."""
+    return json.dumps(plain(as_dict(found)), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def as_dict(found: Design) -> dict[str, Any]:
+    """The design, ready for JSON."""
+    return {
+        "file": found.fit.measurements.source,
+        "model": found.fit.name,
+        "against": None if found.rival is None else found.rival.name,
+        "for": found.target,
+        "kind": found.kind,
+        "sd_before": _deviations(found, found.sd),
+        "proposals": [
+            {
+                "theta_i_deg": np.rad2deg(p.theta_i),
+                "phi_i_deg": np.rad2deg(p.phi_i),
+                "theta_o_deg": np.rad2deg(p.theta_o),
+                "phi_deg": np.rad2deg(p.phi),
+                "repeats": p.repeats,
+                "gain": p.gain,
+                "sd_after": _deviations(found, p.sd),
+            }
+            for p in found.proposals
+        ],
+    }
+
+
+def _deviations(found: Design, sd: np.ndarray) -> dict[str, dict[str, Any]]:
+    log = space(found.fit.model).log[found.fit.free]
+    kinds = zip(found.names, sd, log, strict=True)
+    return {name: {"sd": float(s), "of": "ln" if ratio else "value"} for name, s, ratio in kinds}
+
+
+def as_text(found: Design) -> str:
+    """Plain words, then a line for each proposal: where, and how well things are known before → after."""
+    lines = [("", "light", "sensor", "azimuth", *([] if found.rival else ["known to"]), _gain_heading(found))]
+    before = found.sd
+    for k, proposal in enumerate(found.proposals):
+        known = [] if found.rival else [_known(found, before, proposal.sd)]
+        gain = f"{proposal.gain:.1f} sd" if found.rival else f"{proposal.gain:.3g} times"
+        lines.append((f"{k + 1}.", *_where(proposal), *known, gain))
+        before = proposal.sd
+    return text_table(_caption(found), lines)
+
+
+def _gain_heading(found: Design) -> str:
+    return "models apart" if found.rival else "sharper"
+
+
+def _caption(found: Design) -> str:
+    thing = "sample" if found.kind == "sample" else "curve"
+    first = found.proposals[0]
+    if found.rival is not None:
+        return (
+            f"To tell {found.fit.name} from {found.rival.name}, measure next where they differ most for what the worse "
+            f"of them expects; each {thing} counts those before it."
+        )
+    what = f"{found.target} of {found.fit.name}" if found.target else f"all parameters of {found.fit.name}"
+    light, sensor, _ = _where(first)
+    caption = f"For {what}, the {thing} that tells most: light at {light}, sensor at {sensor}."
+    return f"{caption} Expected, if the model is right; each line counts those before it."
+
+
+def _where(p: Proposal) -> tuple[str, str, str]:
+    angles = np.rad2deg(p.theta_o)
+    turned = f" (azimuth {np.rad2deg(p.phi_i):.0f}°)" if p.phi_i else ""
+    sensor = (
+        f"{angles[0]:.1f}°" if len(angles) == 1 else f"{angles.min():.0f} to {angles.max():.0f}°, {len(angles)} angles"
+    )
+    return f"{np.rad2deg(p.theta_i):.0f}°{turned}", sensor, f"{np.rad2deg(p.phi):.0f}°"
+
+
+def _known(found: Design, before: np.ndarray, after: np.ndarray) -> str:
+    """sd before → after of the target, or of the parameter that gains most."""
+    owned = [k for k, n in enumerate(found.names) if found.target in (n, n.rpartition(" ")[0])]
+    k = max(owned or range(len(after)), key=lambda k: before[k] / after[k])
+    log = space(found.fit.model).log[found.fit.free][k]
+    return f"{found.names[k]} ± {_amount(before[k], log)} → ± {_amount(after[k], log)}"
+
+
+def _amount(sd: float, log: bool) -> str:
+    """A percentage of what is positive, a factor where that would mislead, else the number."""
+    if not log:
+        return f"{sd:.2g}"
+    return f"{100 * sd:.2g} %" if sd < 0.5 else f"a factor {np.exp(min(sd, 20.0)):.2g}"

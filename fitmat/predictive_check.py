@@ -1,0 +1,159 @@
+"""Posterior-predictive checks: whether the fitted model can make data like the measured ones, and where it cannot.
+
+It fits nothing and compares no models: a model may be the best of all and still fail.
+"""
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+from fitmat.brdf import AbstractBRDF, evaluate_pairs
+from fitmat.display import html_table, text_table
+from fitmat.errors import FitmatError
+from fitmat.incidences import incidences
+from fitmat.likelihood import Data, inferred_noise, mapped
+from fitmat.losses import DEFAULT
+from fitmat.params import with_vector
+from fitmat.posterior import Posterior
+from fitmat.predictive_statistics import Look, Statistic
+
+DRAWS = 200
+"""Posterior draws behind every p-value, where the file is not large."""
+
+MOST_NUMBERS = 4_000_000
+"""Draws × values; large files get fewer draws, but at least `FEWEST_DRAWS`."""
+
+FEWEST_DRAWS = 20
+
+CANNOT = {
+    ("largest", 1): "cannot make its largest residual",
+    ("largest", -1): "leaves no residual as large as chance would",
+    ("outliers", 1): "leaves more residuals beyond 2 sd than chance does",
+    ("outliers", -1): "leaves fewer residuals beyond 2 sd than chance does: the noise is stated too large",
+    ("peak", 1): "has too low a peak at {}",
+    ("peak", -1): "has too high a peak at {}",
+    ("pattern", 1): "cannot make the pattern seen at {}",
+    ("pattern", -1): "cannot make the alternation of neighbours seen at {}",
+    ("side", 1): "reflects too little at {}",
+    ("side", -1): "reflects too much at {}",
+}
+"""What a failed check says of the model; {} are the places. 1: more was measured than the model makes."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class PredictiveCheck:
+    """All checks of one posterior.
+
+    Attributes:
+        posterior: Of the model that was checked.
+        statistics: What was looked at, in the order of `NAMES`.
+    """
+
+    posterior: Posterior
+    statistics: tuple[Statistic, ...]
+
+    @property
+    def failed(self) -> tuple[Statistic, ...]:
+        """What the model cannot make."""
+        return tuple(s for s in self.statistics if s.surprising)
+
+    @property
+    def words(self) -> str:
+        """What the model cannot make, in a sentence."""
+        name = self.posterior.fit.name
+        if not self.failed:
+            return f"{name} can make data like these: none of {len(self.statistics)} checks is surprising."
+        said = []
+        for (kind, sign), text in CANNOT.items():
+            places = [s.place for s in self.failed if (s.kind, s.sign) == (kind, sign)]
+            if places:
+                said.append(text.format(_listed(places)))
+        return f"{name} {'; it '.join(said)}."
+
+    def _rows(self) -> list[tuple[str, ...]]:
+        return [
+            (s.name, s.place, f"{s.observed:.3g}", f"{s.expected[0]:.3g} – {s.expected[1]:.3g}", f"{s.p:.2g}",
+             "cannot" if s.surprising else "")
+            for s in self.statistics
+        ]  # fmt: skip
+
+    def __str__(self) -> str:
+        """The sentence, then every check."""
+        return text_table(self.words, self._rows())
+
+    def _repr_html_(self) -> str:
+        return html_table(self.words, ("check", "where", "measured", "model, 95 %", "p", ""), self._rows())
+
+
+def _listed(places: list[str]) -> str:
+    return places[0] if len(places) == 1 else f"{', '.join(places[:-1])} and {places[-1]}"
+
+
+def check_predictions(posterior: Posterior, *, seed: int) -> PredictiveCheck:
+    """Compare statistics of the data with those of data replicated from the posterior (Rubin 1984; Gelman et al. 1996).
+
+    A statistic T may depend on the parameters. For each draw θ the probability that replicated data have a larger
+    T(y_rep, θ) than T(y, θ) is averaged over the draws. Residuals of replicated data are N(0, 1) by construction of
+    the likelihood, so that this probability is known in closed form: of the largest |z|, of the binomial number beyond
+    2 sd, of a mean, and of the highest value of an incidence, P(max ≤ m) = Π_i Φ(T(m κ_i) − T(f κ_i)). That of
+    neighbours comes from drawn residuals. Such p-values are a little conservative: parameters that were fitted explain
+    part of what is looked at (Robins, van der Vaart & Ventura 2000).
+
+    Args:
+        posterior: Of a fit by a likelihood with Gaussian residuals.
+        seed: Of the replicated data.
+
+    Raises:
+        FitmatError: the fit is not finite, or its loss is no such likelihood.
+    """
+    fit = posterior.fit
+    if not fit.finite:
+        raise FitmatError(f"{fit.name}: the fit ended {fit.result}, there is nothing to check; check the data.")
+    if not fit.loss.posterior or fit.loss.shrink is not DEFAULT.shrink:
+        raise FitmatError(
+            f"{fit.name}: the loss {fit.loss.name} makes no Gaussian residuals to check; fit with the default loss."
+        )
+    rng, data = np.random.default_rng(seed), fit.data
+    used = np.greater(data.weight, 0.0)
+    groups = incidences(np.asarray(data.wi), np.asarray(used.any(axis=1)))
+    y = np.where(used, np.asarray(data.x / data.kappa), -np.inf)
+    highest, top = np.array([y[g.rows].max() for g in groups]), np.zeros(len(y))
+    for group, value in zip(groups, highest, strict=True):
+        top[group.rows] = value
+    values, s = posterior.thinned(int(np.clip(MOST_NUMBERS / used.size, FEWEST_DRAWS, DRAWS)))
+    seen = _seen(fit.model, data, jnp.asarray(values), jnp.asarray(s), jnp.asarray(top))
+    look = Look(fit, used, groups, rng, *(np.asarray(part) for part in seen))
+    found = [*look.whole(), *look.peaks(highest, s), *look.patterns(), *look.sides()]
+    adjusted = _holm(np.array([f.p for f in found]))
+    judged = (dataclasses.replace(f, adjusted=float(a)) for f, a in zip(found, adjusted, strict=True))
+    return PredictiveCheck(posterior, tuple(judged))
+
+
+@eqx.filter_jit
+def _seen(template: AbstractBRDF, data: Data, values: Array, s: Array, top: Array) -> tuple[Array, Array, Array, Array]:
+    """Residuals, ln P(y_rep ≤ top), model f κ and noise of every draw, (d, n, c) each."""
+
+    def one(draw: tuple[Array, Array]) -> tuple[Array, Array, Array, Array]:
+        model, spread = with_vector(template, draw[0]), draw[1]
+        noise = inferred_noise(model, data) if data.loss.infers_noise else data.noise
+        x = evaluate_pairs(model, data.wi, data.wo) * data.kappa
+        at, measured, above = (
+            data.loss.transform(part, noise, data.kappa, spread) for part in (x, data.x, top[:, None] * data.kappa)
+        )
+        below = jnp.where(data.weight > 0, jax.scipy.special.log_ndtr(above - at), 0.0)
+        return data.weight * (measured - at), below, x, noise
+
+    return mapped(one, (values, s))  # pyright: ignore[reportArgumentType]
+
+
+def _holm(p: np.ndarray) -> np.ndarray:
+    """p-values of which, if all were chance, any falls below α with probability at most α (Holm 1979)."""
+    order = np.argsort(p)
+    raised = np.maximum.accumulate(p[order] * (len(p) - np.arange(len(p))))
+    adjusted = np.empty_like(p)
+    adjusted[order] = np.minimum(raised, 1.0)
+    return adjusted

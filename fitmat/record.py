@@ -1,0 +1,168 @@
+"""The record of a study: everything the report holds, as JSON types.
+
+It computes nothing; numbers that are not finite become null.
+"""
+
+from importlib.metadata import version
+from typing import Any
+
+from fitmat import priors
+from fitmat.choice import Choice
+from fitmat.comparison import Comparison
+from fitmat.display import plain
+from fitmat.estimate import Estimate
+from fitmat.identifiability import Identifiability
+from fitmat.metrics import fit_metrics
+from fitmat.outcome import RESULTS
+from fitmat.posterior import Posterior
+from fitmat.sphere import Perceived, Spread
+from fitmat.study import Study
+from fitmat.summary import Quantity, derived, parameters
+
+
+def to_dict(study: Study) -> dict[str, Any]:
+    """What the report holds, as JSON types; numbers that are not finite become null."""
+    first = study.posteriors[0].fit
+    m = first.measurements
+    return plain(
+        {
+            "fitmat": version("fitmat"),
+            "file": m.source,
+            "n_samples": m.n_samples,
+            "n_masked": m.n_masked,
+            "masked": m.masked,
+            "notes": [*m.notes, *filter(None, [str(m.instrument)])],
+            "noise": first.noise.words,
+            "loss": {"name": first.loss.name, "formula": first.loss.formula, "posterior": first.loss.posterior},
+            "channels": list(m.channels),
+            "fits": [_fit_dict(p, study) for p in study.posteriors],
+            "choice": None if study.choice is None else _choice_dict(study.choice),
+            "match": None if study.match is None else _match_dict(study.match),
+        }
+    )
+
+
+def _fit_dict(posterior: Posterior, study: Study) -> dict[str, Any]:
+    fit, d = posterior.fit, posterior.diagnostics
+    channels, doubts = len(fit.measurements.channels), study.doubts(posterior)
+    identified = next((i for i in study.identified if i.fit is fit), None)
+    check = next((c for c in study.checks if c.posterior is posterior), None)
+    opinion = next((o for o in study.opinions if o.posterior is posterior), None)
+    diagnosed = {"ess_min": None, "rhat_max": None, "tau_max": None}
+    if d is not None:
+        diagnosed = {"ess_min": d.ess.min(), "rhat_max": d.rhat.max(), "tau_max": d.tau.max()}
+        diagnosed |= {"acceptance": d.acceptance, "steps": d.steps, "burn_in": d.burn_in, "walkers": d.walkers}
+        diagnosed |= {"seed": d.seed}
+    return {
+        "model": fit.name,
+        "result": fit.result,
+        "result_means": RESULTS[fit.result],
+        "adequacy": fit.adequacy,
+        "doubts": list(doubts.words),
+        "intervals_hold": not doubts.inadequate,
+        "not_determined": list(fit.undetermined),
+        "n_starts": fit.n_starts,
+        "n_starts_agreeing": fit.n_starts_agreeing,
+        "steps": fit.steps,
+        "parameters": {q.name: _quantity_dict(q, channels) for q in parameters(posterior)},
+        "derived": {q.name: _quantity_dict(q, channels) for q in derived(posterior)},
+        "identifiability": None if identified is None else _identified_dict(identified),
+        "priors": priors.words(fit.model, fit.data.prior),
+        "posterior": {
+            "verdict": posterior.verdict,
+            "interrupted": posterior.interrupted,
+            "pareto_k": posterior.pareto_k,
+            **diagnosed,
+            "second_sampler": None if opinion is None else {"verdict": opinion.verdict, "words": opinion.words},
+        },
+        "predictive_check": None if check is None else {"failed": bool(check.failed), "words": check.words},
+        "metrics": fit_metrics(fit),
+        "log_likelihood": fit.log_likelihood,
+        "aicc": fit.aicc,
+        "bic": fit.bic,
+    }
+
+
+def _identified_dict(found: Identifiability) -> dict[str, Any]:
+    states = {v.name: {"state": v.state, "ci95": list(v.ci95), "contraction": v.contraction} for v in found.verdicts}
+    return {"words": found.words, "parameters": states}
+
+
+def _choice_dict(choice: Choice) -> dict[str, Any]:
+    candidates = [
+        {
+            "model": c.name,
+            "aicc": c.fit.aicc,
+            "bic": c.fit.bic,
+            "elpd": None if c.evidence is None else c.evidence.elpd,
+            "behind": c.behind,
+            "behind_se": c.behind_se,
+            "left_out_error": None if c.left_out is None else c.left_out.error,
+            "left_out_surprise": None if c.left_out is None else c.left_out.surprise,
+            "broken_laws": list(c.broken),
+            "doubts": list(c.doubts),
+            "reliable": c.reliable,
+        }
+        for c in choice.candidates
+    ]
+    return {"verdict": choice.verdict, "candidates": candidates}
+
+
+def _quantity_dict(q: Quantity, channels: int) -> dict[str, Any]:
+    """Scalars for shared quantities and single-channel files, else lists in channel order."""
+    scalar = not q.per_channel or channels == 1
+    value, sd, ci95 = ((a[0] if scalar else a) for a in (q.value, q.sd, q.ci95))
+    return {"value": value, "sd": sd, "ci95": ci95, "unit": q.unit, "symbol": q.symbol, "remark": q.remark}
+
+
+def _match_dict(match: Comparison) -> dict[str, Any]:
+    def estimate(e: Estimate | None) -> dict[str, Any] | None:
+        return None if e is None else {"value": e.value, "ci95": list(e.ci95)}
+
+    return {
+        "empirical": match.empirical.fit.name,
+        "microfacet": match.microfacet.fit.name,
+        "hemisphere_distance": estimate(match.hemisphere_distance),
+        "measured_distance": estimate(match.measured_distance),
+        "cube_root_distance": estimate(match.cube_root_distance),
+        "albedo_gap_max": {
+            **(estimate(match.albedo_gap_max) or {}),
+            "theta_i_deg": match.albedo_gap_theta_i_deg,
+            "sign": match.albedo_gap_sign,
+        },
+        "implied_exponent": estimate(match.implied_exponent),
+        "fitted_exponent": estimate(match.fitted_exponent),
+        "fitted_alpha": estimate(match.fitted_alpha),
+        "implied_alpha": estimate(match.implied_alpha),
+        "width_ratio": estimate(match.width_ratio),
+        "delta_aicc": match.delta_aicc,
+        "delta_bic": match.delta_bic,
+        "distances": {
+            name: {
+                "all": estimate(whole),
+                "regions": {r: estimate(e) for r, e in match.distances.by_region[name].items()},
+                "share": {r: estimate(e) for r, e in match.distances.share[name].items()},
+            }
+            for name, whole in match.distances.whole.items()
+        },
+        "cannot_be_told_apart_up_to_deg": match.telling.alike_up_to_deg,
+        "imitations": [
+            {"of": i.of, "by": i.model.name, "metric": i.metric, "parameters": i.parameters, "distance": i.distance}
+            for i in match.imitations
+        ],
+        "perceived": None if match.perceived is None else _perceived_dict(match.perceived),
+        "verdict": match.verdict,
+    }
+
+
+def _perceived_dict(seen: Perceived) -> dict[str, Any]:
+    def difference(found: Spread) -> dict[str, Any]:
+        parts = {"mean": found.mean, "worst_twentieth": found.worst_twentieth, "largest": found.largest}
+        return {name: {"value": e.value, "ci95": list(e.ci95)} for name, e in parts.items()}
+
+    return {
+        "words": seen.words,
+        "delta_e_2000": difference(seen.delta_e_2000),
+        "delta_e_itp": difference(seen.delta_e_itp),
+        "lightings": {x.name: {"delta_e_2000": difference(x.delta_e_2000)} for x in seen.lightings},
+    }

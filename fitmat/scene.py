@@ -1,0 +1,203 @@
+"""A scene: a sphere, the lights around it, and the pixels in which a viewer must look at it to miss nothing.
+
+It knows no reflectance model and no colour.
+
+The viewer looks along −z from far away (orthographic); x points right and y up on the screen, the sphere is the unit
+disc. Three lights of one direction each, of irradiance 1 on a surface that faces them, and an environment are there
+one after the other. The sphere casts no shadow on itself and no light is reflected twice. An anisotropic surface lies
+with its x axis along the parallels about the vertical axis y, as if turned on a lathe.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from fitmat._types import Directions, Scalar
+from fitmat.quadrature import facets, lobe_rule
+
+LIGHTS = {"front light": (20.0, 120.0), "side light": (60.0, 150.0), "rim light": (140.0, 45.0)}
+"""Name → angle from the viewer and direction on the screen (counter-clockwise from the right), degrees."""
+
+ENVIRONMENT = "sky and windows"
+
+GROUND = 0.2 * 7.0 / 9.0
+"""Radiance of ground of albedo 0.2 below the overcast sky, whose irradiance is 7π/9; the zenith's radiance is 1."""
+
+WINDOWS = ((50.0, 135.0, 20.0, 10.0), (120.0, 20.0, 20.0, 10.0))
+"""Angle from the viewer and direction on the screen (degrees), sharpness κ, radiance added at the centre."""
+
+LIGHT_RINGS, LIGHT_PIXELS = 96, 12
+"""Rings of pixels about the normal that mirrors a light, and pixels on each side of a ring."""
+
+SKY_RINGS, SKY_PIXELS, SKY_NODES = 24, 16, (64, 24)
+"""The same in the environment, about the viewer; nodes of `lobe_rule` for each ring, on one side."""
+
+COARSE_RINGS, COARSE_PIXELS, COARSE_NODES = 12, 8, (32, 12)
+"""The same for anisotropic models, which need their own rule for each pixel."""
+
+GRAZING = 0.052336
+"""cos 87°: pixels are left out where a light falls or the viewer looks at a flatter angle than 3°."""
+
+
+class Screen(eqx.Module):
+    """Pixels of the sphere, on rings about some normal, on one side of its meridian and then on the other.
+
+    Attributes:
+        axes: Rows: two tangents and the normal in the middle of the rings, in the viewer's axes.
+        half: Half the angle between the viewer and the light, both in the plane of the first tangent, radians.
+        rings: Angles of the rings, radians, increasing, (a,).
+        along: Where on one side of a ring, increasing from −1 to 1, (b,).
+        area: On the screen, where the sphere covers π, (a, s, b); 0 where unlit or hidden. s is 2, or 1 where both
+            sides look the same.
+    """
+
+    axes: Float[Array, "3 3"]
+    half: Scalar
+    rings: Float[Array, " a"]
+    along: Float[Array, " b"]
+    area: Float[Array, "a s b"]
+
+    @property
+    def normals(self) -> Float[Array, "a s b 3"]:
+        """Of the pixels, in the viewer's axes."""
+        turn = jnp.pi / 2.0 + reach(self.rings, self.half)[:, None] * self.along
+        turn, rings = jnp.stack([turn, -turn][: self.area.shape[1]], axis=1), self.rings[:, None, None]
+        sin = jnp.sin(rings)
+        return jnp.stack([sin * jnp.cos(turn), sin * jnp.sin(turn), jnp.cos(rings + 0.0 * turn)], axis=-1) @ self.axes
+
+
+def reach(theta: Float[Array, "..."], half: Scalar) -> Float[Array, "..."]:
+    """How far a ring can be seen and lit on either side of azimuth ±90°: at most π/2, which is everywhere.
+
+    The viewer is at zenith angle `half` and azimuth 0, the light at azimuth 180°: c_o = c_θ c_h + s_θ s_h cos φ and
+    c_i = c_θ c_h − s_θ s_h cos φ are above g = `GRAZING` where |cos φ| < (c_θ c_h − g)/(s_θ s_h).
+
+    Args:
+        theta: Angle of the ring, radians.
+        half: Half the angle between viewer and light, radians.
+    """
+    most = (jnp.cos(theta) * jnp.cos(half) - GRAZING) / jnp.maximum(jnp.sin(theta) * jnp.sin(half), 1e-300)
+    return jnp.arcsin(jnp.clip(most, 0.0, 1.0))
+
+
+class Lit(eqx.Module):
+    """Pixels under light of one direction, L = f c_i.
+
+    Attributes:
+        screen: m pixels.
+        wi: To the light, local frames, (m, 3).
+        wo: To the viewer, (m, 3).
+    """
+
+    screen: Screen
+    wi: Directions
+    wo: Directions
+
+
+class Surrounded(eqx.Module):
+    """Pixels in the environment, L = Σ_k light f: s pairs of directions each serve j pixels, m = s j.
+
+    Attributes:
+        screen: m pixels, in the order of (s, j).
+        wi: To the light, local frames, (s, k, 3).
+        wo: To the viewer, (s, k, 3).
+        light: Radiance times projected solid angle, (s, j, k).
+    """
+
+    screen: Screen
+    wi: Float[Array, "s k 3"]
+    wo: Float[Array, "s k 3"]
+    light: Float[Array, "s j k"]
+
+
+def radiance(w: Float[Array, "... 3"]) -> Float[Array, "..."]:
+    """L_e of the environment from direction w (viewer's axes): overcast sky, ground, and two soft windows.
+
+    Sky: (1 + 2 sin γ)/3 at the elevation γ over the horizontal plane y = 0 (Moon & Spencer 1942; the CIE standard
+    overcast sky). Windows: L exp(κ(w·c − 1)), 6° in standard deviation.
+    """
+    up = w[..., 1]
+    total = jnp.where(up > 0.0, (1.0 + 2.0 * up) / 3.0, GROUND)
+    for angle, azimuth, sharpness, brightness in WINDOWS:
+        centre = frame(*(jnp.deg2rad(jnp.asarray(part)) for part in (angle, azimuth)))[2]
+        total += brightness * jnp.exp(sharpness * (w @ centre - 1.0))
+    return total
+
+
+def frame(theta: Scalar, azimuth: Scalar) -> Float[Array, "3 3"]:
+    """Rows: two tangents and the normal, theta away from the viewer, who has azimuth 0 in it.
+
+    Args:
+        theta: Angle of the normal from the viewer, radians.
+        azimuth: Direction of the normal on the screen, radians.
+    """
+    sin, cos, across, along = jnp.sin(theta), jnp.cos(theta), jnp.sin(azimuth), jnp.cos(azimuth)
+    rows = (-cos * along, -cos * across, sin), (across, -along, 0.0 * cos), (sin * along, sin * across, cos)
+    return jnp.stack([jnp.stack(row) for row in rows])
+
+
+def tangents(normal: Float[Array, "3"]) -> Float[Array, "3 3"]:
+    """Rows: the tangent along the parallel about the vertical axis y, the one along the meridian, and the normal."""
+    x, y, z = normal
+    across = jnp.sqrt(jnp.maximum(x * x + z * z, 1e-24))
+    along = jnp.stack([z, 0.0 * y, -x]) / across
+    return jnp.stack([along, jnp.cross(normal, along), normal])
+
+
+def lit(width: Scalar, angle: float, azimuth: float, *, isotropic: bool) -> Lit:
+    """Pixels that crowd around the normal that mirrors the light to the viewer, on the scale of the lobe's width.
+
+    The rings are those of `quadrature.facets`, the micro-normals taken for normals of the sphere: a highlight is seen
+    by as many pixels whatever its size. On a ring, Gauss over what is seen and lit.
+
+    Args:
+        width: Slope-like width of the narrowest lobe.
+        angle: Of the light from the viewer, degrees.
+        azimuth: Of the light on the screen, degrees.
+        isotropic: Whether both models are, so that one side of the plane of light and viewer is enough.
+    """
+    sides = 1 if isotropic else 2
+    half, turn = jnp.deg2rad(jnp.asarray(angle / 2.0)), jnp.deg2rad(jnp.asarray(azimuth))
+    spots = facets(jnp.zeros(()), width, nodes=(LIGHT_RINGS, 1))
+    rings = jnp.arctan2(jnp.hypot(spots.h[:, 0], spots.h[:, 1]), spots.h[:, 2])
+    along, shares = (jnp.asarray(part) for part in np.polynomial.legendre.leggauss(LIGHT_PIXELS))
+    solid = (spots.solid / (sides * jnp.pi) * reach(rings, half))[:, None, None] * shares
+    screen = Screen(frame(half, turn), half, rings, along, jnp.broadcast_to(solid, (LIGHT_RINGS, sides, LIGHT_PIXELS)))
+    normals = screen.normals.reshape(-1, 3)
+    surface = jax.vmap(tangents)(normals)
+    area = screen.area * jnp.maximum(normals[:, 2].reshape(screen.area.shape), 0.0)
+    screen = eqx.tree_at(lambda part: part.area, screen, area)
+    return Lit(screen, surface @ frame(2.0 * half, turn)[2], surface[:, :, 2])
+
+
+def surrounded(width: Scalar, *, isotropic: bool) -> Surrounded:
+    """Rings of pixels with a rule over the light that is dense around each pixel's mirror direction.
+
+    The rule of `quadrature.lobe_rule` around the viewer gives the directions to the light. The models of isotropic
+    surfaces need one rule a ring, on one side of the plane of view: the light of both sides is averaged.
+
+    Args:
+        width: Slope-like width of the narrowest lobe.
+        isotropic: Whether both models are.
+    """
+    count, pixels = (SKY_RINGS, SKY_PIXELS) if isotropic else (COARSE_RINGS, COARSE_PIXELS)
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    square = 1.0 - GRAZING**2
+    rings, along = jnp.arcsin(jnp.sqrt(square * (nodes + 1.0) / 2.0)), (2.0 * jnp.arange(pixels) + 1.0) / pixels - 1.0
+    area = np.pi * square * weights[:, None, None] / (4.0 * pixels) * np.ones((2, pixels))
+    screen = Screen(jnp.eye(3), jnp.zeros(()), rings, along, jnp.asarray(area))
+    normals = screen.normals.reshape(-1, 3)
+    if isotropic:
+        rule = jax.vmap(lambda t: lobe_rule(t, width, nodes=SKY_NODES))(rings)
+        turns = jnp.arctan2(normals[:, 1], normals[:, 0]).reshape(count, -1)
+        surface = jax.vmap(lambda t, every: jax.vmap(lambda turn: frame(t, turn))(every))(rings, turns)
+        sides = rule.wo[:, None], (rule.wo * jnp.array([1.0, -1.0, 1.0]))[:, None]
+        light = sum(radiance(side @ surface) for side in sides) / 2.0 * rule.weight[:, None]
+    else:
+        surface = jax.vmap(tangents)(normals)
+        turns, each = jnp.arctan2(surface[:, 1, 2], surface[:, 0, 2]), jnp.repeat(rings, 2 * pixels)
+        rule = jax.vmap(lambda t, turn: lobe_rule(t, width, phi_i=turn, nodes=COARSE_NODES))(each, turns)
+        light = (radiance(rule.wo @ surface) * rule.weight)[:, None]
+    return Surrounded(screen, rule.wo, jnp.broadcast_to(rule.wi[:, None], rule.wo.shape), light)

@@ -1,0 +1,249 @@
+"""What an eye sees: a sphere of each model under the same lights, and how different its colours look.
+
+It fits nothing and judges no measurement; lights and pixels are those of `scene`.
+
+A pixel with normal n shows L = f max(n·l, 0), in the environment L = ∫ f L_e (n·ω) dω. The exposure makes the mean
+luminance of the microfacet model's best fit `MIDDLE_GREY`, for each light anew: both models and all draws are seen by
+the same camera.
+"""
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+from scipy.ndimage import map_coordinates
+
+from fitmat import scene
+from fitmat.brdf import AbstractBRDF, evaluate_pairs, surface
+from fitmat.estimate import Estimate, estimate
+from fitmat.geometry import zenith
+from fitmat.likelihood import mapped
+from fitmat.params import with_vector
+from fitmat.scene import Screen
+from fitmat.spectra import colouring, delta_e_2000, delta_e_itp, shown, to_srgb
+
+DRAWS = 40
+"""Pairs of posterior draws behind every interval."""
+
+MIDDLE_GREY = 0.18
+"""Mean luminance of the lit part of the reference, white being 1: that of a photographer's grey card."""
+
+JUST_NOTICEABLE, CLEARLY_VISIBLE = 1.0, 3.0
+"""ΔE2000 from which an eye may notice a difference side by side, and from which anybody does.
+
+Mokrzycki & Tatol 2011 (Machine Graphics & Vision 20(4)): below 1 not noticed, from 2–3.5 on by the untrained as well;
+Paravina et al. 2015 (J. Esthet. Restor. Dent. 27): half of the observers see 0.8 and reject 1.8. ΔE_ITP is scaled so
+that 1 is just noticeable (ITU-R BT.2124).
+"""
+
+SIZE, SUBPIXELS = 72, 4
+"""Pictures are so many pixels wide, each the mean of so many by so many points."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Spread:
+    """How far apart the colours of two spheres are, over the pixels that are seen and lit.
+
+    Attributes:
+        mean: Mean over the area on the screen.
+        worst_twentieth: What 5 % of the area exceed.
+        largest: Of any pixel.
+    """
+
+    mean: Estimate
+    worst_twentieth: Estimate
+    largest: Estimate
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Lighting:
+    """Both spheres in one light.
+
+    Attributes:
+        name: Of the light.
+        exposure: Factor from radiance (irradiance 1 on a surface that faces the light; sky zenith 1) to display.
+        delta_e_2000: CIEDE2000 of what an sRGB display shows, which clips what is brighter than white.
+        delta_e_itp: ΔE_ITP with white at `spectra.WHITE_LUMINANCE`, highlights up to 10,000 cd/m².
+        empirical: Picture of the best fit in sRGB from 0 to 1, (h, w, 3), rows from the top; NaN beside the sphere.
+        microfacet: The same of the microfacet model.
+        difference: ΔE2000 of the pictures, (h, w); NaN beside the sphere.
+    """
+
+    name: str
+    exposure: float
+    delta_e_2000: Spread
+    delta_e_itp: Spread
+    empirical: Float[np.ndarray, "h w 3"]
+    microfacet: Float[np.ndarray, "h w 3"]
+    difference: Float[np.ndarray, "h w"]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Perceived:
+    """What an eye sees of the difference between two models.
+
+    Attributes:
+        names: Of the empirical and of the microfacet model.
+        lightings: Light by light.
+        delta_e_2000: Of all lightings together, each with the same share.
+        delta_e_itp: The same.
+        colours: In words, what the channels were taken for.
+    """
+
+    names: tuple[str, str]
+    lightings: tuple[Lighting, ...]
+    delta_e_2000: Spread
+    delta_e_itp: Spread
+    colours: str
+
+    @property
+    def words(self) -> str:
+        """One sentence; the thresholds are `JUST_NOTICEABLE` and `CLEARLY_VISIBLE`, for the worst twentieth."""
+        by_light = sorted(self.lightings, key=lambda lighting: lighting.delta_e_2000.worst_twentieth.value)
+        every, least, most = self.delta_e_2000, by_light[0], by_light[-1]
+        limit = every.worst_twentieth.ci95[1]
+        sees = (
+            "see no difference"
+            if limit < JUST_NOTICEABLE
+            else "hardly see a difference"
+            if limit < CLEARLY_VISIBLE
+            else "clearly see a difference"
+        )
+        where = f", most under the {most.name}, least under the {least.name}" if limit >= JUST_NOTICEABLE else ""
+        numbers = f"ΔE2000 {every.mean.value:.1f} on average, {every.worst_twentieth.value:.1f} in the worst twentieth"
+        return f"On a lit sphere an eye would {sees}{where} ({numbers})."
+
+
+def perceived(
+    empirical: AbstractBRDF, microfacet: AbstractBRDF, draws: tuple[Array, Array], channels: tuple[str, ...]
+) -> Perceived:
+    """Both models' spheres in every light, and what an eye sees of their difference.
+
+    Lobes of any width are resolved: the pixels of a light crowd around the normal that mirrors it to the viewer
+    (`quadrature.facets`), the incident directions of the environment around the mirror direction (`lobe_rule`), both
+    on the scale of the narrowest lobe of all draws.
+
+    Args:
+        empirical: The fitted model; only its surface counts, not the instrument.
+        microfacet: The reference.
+        draws: Parameter vectors of both, paired, rows: the best fits, then posterior draws, (d, p) and (d, q); at
+            most `DRAWS` of these are used, evenly spread.
+        channels: Names of the channels.
+
+    Example:
+        >>> import fitmat as fm
+        >>> from fitmat.params import vector
+        >>> one, other = fm.model("lambert+phong", kd=0.3), fm.model("lambert+ggx", kd=0.3)
+        >>> found = perceived(one, other, (vector(one)[None], vector(other)[None]), ("value",))
+        >>> found.colours
+        'one channel, drawn grey'
+    """
+    colours, count = colouring(channels), len(draws[0])
+    used = np.unique(np.r_[0, np.linspace(min(1, count - 1), count - 1, min(DRAWS, count)).round().astype(int)])
+    pairs = jnp.asarray(draws[0])[used], jnp.asarray(draws[1])[used]
+    screens, computed = _rendered(empirical, microfacet, pairs, jnp.asarray(colours.weights))
+    names = [*scene.LIGHTS, scene.ENVIRONMENT]
+    found = [
+        _lighting(name, jax.tree.map(np.asarray, screen), np.asarray(xyz))
+        for name, screen, xyz in zip(names, screens, computed, strict=True)
+    ]
+    every = [np.concatenate([deltas[k] for _, deltas, _ in found], axis=1) for k in range(2)]
+    shares = np.concatenate([share for _, _, share in found])
+    return Perceived(
+        names=(surface(empirical).name, surface(microfacet).name),
+        lightings=tuple(lighting for lighting, _, _ in found),
+        delta_e_2000=_spread(every[0], shares),
+        delta_e_itp=_spread(every[1], shares),
+        colours=colours.words,
+    )
+
+
+@eqx.filter_jit
+def _rendered(
+    empirical: AbstractBRDF, microfacet: AbstractBRDF, values: tuple[Array, Array], weights: Float[Array, "c 3"]
+) -> tuple[list[Screen], list[Float[Array, "d 2 m 3"]]]:
+    """The pixels of each lighting, and XYZ radiances there of both models for d pairs of draws."""
+
+    def models(pair: Array) -> list[AbstractBRDF]:
+        parts = jnp.split(pair, [values[0].shape[1]])
+        return [surface(with_vector(f, v)) for f, v in zip((empirical, microfacet), parts, strict=True)]
+
+    pairs = jnp.concatenate(values, axis=1)
+    width = jnp.min(jax.vmap(lambda pair: jnp.stack([f.width() for f in models(pair)]))(pairs))
+    isotropic = all(surface(f).isotropic for f in (empirical, microfacet))
+    spots = [scene.lit(width, *where, isotropic=isotropic) for where in scene.LIGHTS.values()]
+    around = scene.surrounded(width, isotropic=isotropic)
+    wi = jnp.concatenate([*(spot.wi for spot in spots), around.wi.reshape(-1, 3)])
+    wo = jnp.concatenate([*(spot.wo for spot in spots), around.wo.reshape(-1, 3)])
+    ends = np.cumsum([len(spot.wi) for spot in spots])
+
+    def seen(model: AbstractBRDF) -> list[Array]:
+        f = evaluate_pairs(model, wi, wo)
+        xyz = jnp.broadcast_to(f, (len(f), len(weights))) @ weights
+        *direct, rest = jnp.split(xyz, ends)
+        sky = around.light @ rest.reshape(*around.wi.shape[:2], 3)
+        return [*(x * spot.wi[:, 2:] for x, spot in zip(direct, spots, strict=True)), sky.reshape(-1, 3)]
+
+    def both(pair: Array) -> list[Array]:
+        return [jnp.stack(parts) for parts in zip(*map(seen, models(pair)), strict=True)]
+
+    return [*(spot.screen for spot in spots), around.screen], mapped(both, pairs)
+
+
+def _lighting(
+    name: str, screen: Screen, xyz: Float[np.ndarray, "d 2 m 3"]
+) -> tuple[Lighting, list[np.ndarray], np.ndarray]:
+    """The lighting; ΔE2000 and ΔE_ITP of all draws, (d, m) each; each pixel's share of the lit area, (m,)."""
+    share = np.asarray(screen.area / screen.area.sum()).ravel()
+    exposure = float(MIDDLE_GREY / max(share @ xyz[0, 1, :, 1], 1e-300))
+    one, other = np.moveaxis(exposure * xyz, 1, 0)
+    deltas = [delta_e_2000(shown(one), shown(other)), delta_e_itp(one, other)]
+    drawn = _pictures(screen, np.concatenate([one[0], other[0]], axis=1))
+    lighting = Lighting(
+        name=name,
+        exposure=exposure,
+        delta_e_2000=_spread(deltas[0], share),
+        delta_e_itp=_spread(deltas[1], share),
+        empirical=to_srgb(drawn[..., :3]),
+        microfacet=to_srgb(drawn[..., 3:]),
+        difference=delta_e_2000(shown(drawn[..., :3]), shown(drawn[..., 3:])),
+    )
+    return lighting, deltas, share
+
+
+def _spread(delta: Float[np.ndarray, "d m"], share: Float[np.ndarray, " m"]) -> Spread:
+    """Weighted by area; between the ranks of two pixels the quantile is interpolated."""
+    lit = share > 0
+    delta, share = delta[:, lit], share[lit] / share[lit].sum()
+    order = np.argsort(delta, axis=1)
+    below = np.cumsum(share[order], axis=1) - 0.5 * share[order]
+    ranked = np.take_along_axis(delta, order, axis=1)
+    twentieth = np.array([np.interp(0.95, *row) for row in zip(below, ranked, strict=True)])
+    return Spread(estimate(delta @ share), estimate(twentieth), estimate(ranked[:, -1]))
+
+
+def _pictures(screen: Screen, values: Float[np.ndarray, "m k"]) -> Float[np.ndarray, "h w k"]:
+    """Values between the pixels by linear interpolation, averaged over the points of each pixel of the picture."""
+    count = SIZE * SUBPIXELS
+    middle = (np.arange(count) + 0.5) * 2.0 / count - 1.0
+    x, y = np.meshgrid(middle, -middle)
+    inside = x * x + y * y < 1.0 - scene.GRAZING**2
+    x, y = x[inside], y[inside]
+    normals = np.stack([x, y, np.sqrt(1.0 - x * x - y * y)], axis=1) @ np.asarray(screen.axes).T
+    theta, turn = zenith(normals), np.arctan2(normals[:, 1], normals[:, 0])
+    along = (np.abs(turn) - np.pi / 2) / np.maximum(np.asarray(scene.reach(jnp.asarray(theta), screen.half)), 1e-9)
+    ends = np.asarray(screen.along)
+    ends = np.r_[-2.0 - ends[0], ends, 2.0 - ends[-1]]  # the next pixel is on the other side of the meridian
+    grid = values.reshape(*screen.area.shape, -1)
+    grid = np.concatenate([grid[:, ::-1, :1], grid, grid[:, ::-1, -1:]], axis=2)
+    at = np.stack([np.interp(theta, screen.rings, np.arange(len(grid))), np.interp(along, ends, np.arange(len(ends)))])
+    found = np.zeros((count, count, grid.shape[3] + 1))
+    for k in range(grid.shape[3]):
+        sides = [map_coordinates(grid[:, side, :, k], at, order=1, mode="nearest") for side in (0, -1)]
+        found[inside, k] = np.where(np.abs(along) <= 1.0, np.where(turn >= 0.0, *sides), 0.0)
+    found[inside, -1] = 1.0
+    total = found.reshape(SIZE, SUBPIXELS, SIZE, SUBPIXELS, -1).sum(axis=(1, 3))
+    return np.where(total[..., -1:] > 0, total[..., :-1] / np.maximum(total[..., -1:], 1.0), np.nan)
