@@ -52,9 +52,9 @@ def laplace(fit: Fit, *, seed: int, corrected: bool = True) -> Posterior:
         corrected: Whether to correct; above `MOST_CORRECTED` values it is never done.
 
     Returns:
-        A `Posterior`; a fit that is not finite gives a single, unusable draw.
+        A `Posterior`; a fit that is not finite, or under an objective, gives a single draw and no intervals.
     """
-    if not fit.finite:
+    if not (fit.finite and fit.loss.posterior):
         return Posterior(fit, "laplace", fit.values[None], np.array([fit.discrepancy]))
     rng, k, drawn = np.random.default_rng(seed), None, None
     if corrected and fit.n_values <= MOST_CORRECTED:

@@ -83,7 +83,7 @@ def fit(
 ) -> None:
     """Fit models to a file of measurements and write a report with the Phong–microfacet match."""
     _setup()
-    from fitmat import conditions, console, folder, priors, report
+    from fitmat import conditions, console, folder, priors, report, screen
     from fitmat.measurement import Measurements
     from fitmat.params import assignments
 
@@ -103,7 +103,7 @@ def fit(
     if json_:
         sys.stdout.write((target / "fit.json").read_text(encoding="utf-8"))
     else:
-        console.show(found, target)
+        screen.show(found, target)
     if any(p.fit.result != "converged" or p.interrupted for p in found.posteriors):
         raise typer.Exit(NOT_CONVERGED)
 
@@ -211,6 +211,38 @@ def models(
         manual.list_models()
     else:
         manual.page(name)
+
+
+@app.command(
+    epilog="Examples:\n\n  fitmat design measurements.csv --for eta\n\n"
+    "  fitmat design measurements.csv --for match --kind curve --plot next.png"
+)
+@flags.takes(flags.reading, flags.instrument)
+def design(
+    reading: dict[str, Any],
+    instrument: Any,
+    file: options.File,
+    models: options.Models = DEFAULT_MODELS,
+    for_: options.For = None,
+    kind: options.Kind = "sample",
+    count: options.Count = 5,
+    plot: options.DesignPlot = None,
+    force: options.Replace = False,
+    json_: options.Json = False,
+    seed: options.Seed = 0,
+    fix: options.Fix = None,
+) -> None:
+    """Say which angles to measure next, and by how much they would narrow what is not yet known."""
+    _setup()
+    from fitmat import console, planning
+    from fitmat.formats import read
+    from fitmat.params import assignments
+
+    measurements = read(file, **reading, instrument=instrument)
+    known = {name: {} for name in console.model_names(models, measurements)}
+    posteriors = console.fitted(measurements, console.Plan(known, assignments(fix or [], "--fix"), seed=seed))
+    found = planning.planned(posteriors, for_, kind=kind, count=count, plot=plot, force=force)
+    typer.echo(planning.as_json(found) if json_ else planning.as_text(found))
 
 
 @app.command()

@@ -1,6 +1,6 @@
-"""What a person at a terminal sees while a study runs and when it is done.
+"""A study at a terminal: fit, sample, compare and examine, with progress on stderr; Ctrl-C ends it between two steps.
 
-Progress goes to stderr, results to stdout; nothing is computed here.
+Nothing is computed here, and no result is shown.
 """
 
 import contextlib
@@ -16,8 +16,6 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
-from rich.table import Table
-from rich.text import Text
 
 from fitmat.approximation import laplace, laplace_each
 from fitmat.brdf import LOBES, lobe_names, model, normalised
@@ -28,13 +26,12 @@ from fitmat.errors import ModelError
 from fitmat.formats import chunks, read
 from fitmat.losses import DEFAULT
 from fitmat.measurement import Measurements
-from fitmat.outcome import RESULTS, Fit
+from fitmat.outcome import Fit
 from fitmat.params import entries
 from fitmat.posterior import Posterior
 from fitmat.priors import DISCREPANCY
-from fitmat.report import rows
 from fitmat.rows import Rows, held
-from fitmat.study import Study, concluded, detailed
+from fitmat.study import Study, concluded
 from fitmat.uncertainty import resumable_steps, sample
 
 MOST_AT_ONCE = 100_000
@@ -127,6 +124,13 @@ def study(measurements: Measurements | Rows, plan: Plan) -> Study:
             second_opinion=plan.second_opinion,
             progress=lambda words: bar.update(last, description=words),
         )
+
+
+def fitted(measurements: Measurements, plan: Plan) -> list[Posterior]:
+    """Fit the models of a plan, with corrected draws around each fit, and a progress bar on stderr."""
+    jobs = {name: _options(name, plan) for name in plan.known}
+    with _bar() as bar:
+        return _fitted(measurements, jobs, bar, dataclasses.replace(plan, sampling=False))
 
 
 def _fitted(
@@ -246,63 +250,3 @@ def _match(posteriors: Sequence[Posterior]) -> Comparison | None:
         return None
     found = compare(empirical, microfacet)
     return found if np.isfinite(found.hemisphere_distance.value) else None
-
-
-def show(found: Study, folder: Path) -> None:
-    """Print the parameters of every model, what speaks against them, the verdict and where the report is."""
-    out = Console()
-    first = found.posteriors[0].fit
-    out.print(str(first.measurements), markup=False, highlight=False)
-    out.print(first.noise.words, markup=False, highlight=False)
-    if first.n_values > MOST_SAMPLED:
-        words = f"More than {MOST_SAMPLED:,} values: intervals from Laplace's approximation, nothing is sampled."
-        out.print(words, highlight=False)
-    if not first.loss.posterior:
-        out.print(f"The loss {first.loss.name} is an objective: single fits, without a posterior.", highlight=False)
-    shown = detailed(found.posteriors, found.match, found.choice)
-    for posterior in shown:
-        out.print(f"\n[bold]{_title(posterior)}[/bold]", highlight=False)
-        out.print(_table(posterior))
-        _remark(out, found, posterior)
-    out.print("\n→ follows from the parameters above it", highlight=False, style="dim")
-    if len(shown) < len(found.posteriors):
-        out.print(f"{len(found.posteriors) - len(shown)} more models: see the report.", highlight=False, style="dim")
-    verdicts = [] if found.choice is None or len(found.posteriors) == len(shown) else [found.choice.verdict]
-    adequate = " ".join(f"{p.fit.name} {p.fit.adequacy}." for p in found.posteriors)
-    for words in (*verdicts, found.match.verdict if found.match else adequate):
-        out.print(f"\n[bold]{words}[/bold]", highlight=False)
-    out.print(f"\nReport: {folder / 'report.html'}", markup=False, highlight=False, soft_wrap=True)
-
-
-def _remark(out: Console, found: Study, posterior: Posterior) -> None:
-    """How a fit ended, what speaks against it, and what the angles determine."""
-    if posterior.fit.result != "converged":
-        words = f"[yellow]{posterior.fit.result}[/yellow]: {RESULTS[posterior.fit.result]}"
-        out.print(words, highlight=False)
-    if posterior.interrupted:
-        out.print("[yellow]interrupted[/yellow]: sampling was stopped; what was done is kept.", highlight=False)
-    against = found.doubts(posterior)
-    if against.words:
-        out.print(f"[yellow]{'inadequate' if against.inadequate else 'note'}[/yellow]: {against}", highlight=False)
-    for words in [i.words for i in found.identified if i.fit is posterior.fit]:
-        out.print(words, markup=False, highlight=False)
-    for opinion in [o for o in found.opinions if o.posterior is posterior]:
-        out.print(opinion.words, markup=False, highlight=False)
-
-
-def _title(posterior: Posterior) -> str:
-    fit = posterior.fit
-    agreeing = f"{fit.n_starts_agreeing} of {fit.n_starts} starts agree"
-    ending = f"posterior {posterior.verdict}" if fit.loss.posterior else f"loss {fit.loss.name}, no posterior"
-    return f"{fit.name}: {fit.result}, {agreeing}, {ending}"
-
-
-def _table(posterior: Posterior) -> Table:
-    table = Table(box=None, pad_edge=False)
-    for heading in ("parameter", "", "value ± sd", "95 % interval", ""):
-        table.add_column(heading, no_wrap=True)
-    for row in rows(posterior):
-        name = f"→ {row['name']}" if row["kind"] == "follows" else row["name"]
-        remark = " ".join(part for part in (row["unit"], row["remark"].removesuffix(" by these angles")) if part)
-        table.add_row(*(Text(cell) for cell in (name, row["symbol"], row["value"], row["interval"], remark)))
-    return table

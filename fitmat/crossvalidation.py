@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat.brdf import AbstractBRDF, evaluate_pairs
-from fitmat.fitting import _refine
+from fitmat.fitting import refine
 from fitmat.incidences import incidences
 from fitmat.likelihood import Data, first_discrepancy, mapped, residuals
 from fitmat.outcome import Fit
@@ -99,7 +99,7 @@ def _refitted(fit: Fit, weights: Float[np.ndarray, "k n c"]) -> tuple[np.ndarray
     found = []
     for weight in weights:
         data = eqx.tree_at(lambda d: d.weight, fit.data, jnp.asarray(weight))
-        ends = jax.device_get(_refine(fit.model, data, starts, first, free, MAX_STEPS))
+        ends = jax.device_get(refine(fit.model, data, starts, first, free, MAX_STEPS))
         best = int(np.argmax(np.nan_to_num(ends.log_likelihood, nan=-np.inf)))
         found.append((ends.values[best], ends.discrepancy[best], ends.solved[best]))
     values, s, settled = (np.array(column) for column in zip(*found, strict=True))

@@ -9,28 +9,19 @@ blind where a parameter is not determined, and random draws would miss what a na
 """
 
 import dataclasses
-from typing import Any, Literal
+from typing import Literal
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from fitmat.brdf import AbstractBRDF
 from fitmat.candidates import Candidates, Kind, Limits, proposed
 from fitmat.errors import FitmatError
-from fitmat.likelihood import mapped
-from fitmat.losses import Loss
+from fitmat.filter_bank import Bank, Task, bank, scores
 from fitmat.noise import noise_law
 from fitmat.outcome import Fit
-from fitmat.params import space, with_vector
 from fitmat.posterior import Posterior
-from fitmat.profile_likelihood import free_names, profiles
-from fitmat.ridge import Ridge, ridge
-
-TRUTHS = 16
-"""Points of the ridge that are taken for the truth, equally likely."""
+from fitmat.profile_likelihood import free_names
 
 APART = 4.9
 """Proposals differ by more than this, in degrees; to take one again there are repeats."""
@@ -141,10 +132,10 @@ def next_angles(
     _refuse(fit, rival, target, (count, repeats))
     fits = (fit,) if rival is None or target != MATCH else (fit, rival)
     looked = proposed(fit, kind, limits or Limits())
-    banks = tuple(_bank(f) for f in fits)
+    banks = tuple(bank(f) for f in fits)
     better = int(np.argmin([f.discrepancy for f in fits]))
     match = (better, 1 - better) if target == MATCH else None
-    task = _Task(jnp.asarray(_law(fit)), jnp.asarray(float(repeats)), _wanted(fit, target), match)
+    task = Task(jnp.asarray(_law(fit)), jnp.asarray(float(repeats)), _wanted(fit, target), match)
     history: list[int] = []
     proposals: list[Proposal] = []
     gains = np.zeros(0)
@@ -185,44 +176,6 @@ def _wanted(fit: Fit, target: str | None) -> tuple[int, ...]:
     return tuple(k for k, names in enumerate(zip(owner, free_names(fit), strict=True)) if target in names)
 
 
-class _Bank(eqx.Module):
-    """A ridge for compiled programs: its Gaussians, the model they belong to, and which centres serve as truths."""
-
-    template: AbstractBRDF
-    base: Array
-    places: tuple[int, ...] = eqx.field(static=True)
-    loss: Loss = eqx.field(static=True)
-    s: Array
-    logs: Array
-    centre: Array
-    covariance: Array
-    truths: Array
-
-    def predicted(self, t: Array, wi: Array, wo: Array) -> Array:
-        """f κ at the natural coordinates t, (c,)."""
-        whole = space(self.template)
-        full = whole.natural(self.base).at[np.array(self.places)].set(t)
-        return jnp.atleast_1d(with_vector(self.template, whole.physical(full))(wi, wo)) * wi[2]
-
-
-class _Task(eqx.Module):
-    """What candidates are judged by: the law of the noise, repeats, the places asked for, and (truth, rival)."""
-
-    law: Array
-    repeats: Array
-    wanted: tuple[int, ...] = eqx.field(static=True)
-    match: tuple[int, int] | None = eqx.field(static=True)
-
-
-def _bank(fit: Fit) -> _Bank:
-    found: Ridge = ridge(fit, profiles(fit))
-    middles = (np.arange(TRUTHS) + 0.5) / TRUTHS
-    truths = np.minimum(np.searchsorted(np.cumsum(found.weight), middles), len(found.weight) - 1)
-    arrays = (np.asarray(fit.discrepancy), np.log(found.weight + 1e-300), found.centre, found.covariance, truths)
-    places = tuple(int(k) for k in fit.free)
-    return _Bank(fit.model, jnp.asarray(fit.values), places, fit.data.loss, *(jnp.asarray(a) for a in arrays))
-
-
 def _law(fit: Fit) -> Float[np.ndarray, "2 c"]:
     """a and b of every channel."""
     m, sigma = fit.measurements, fit.noise.sigma
@@ -238,7 +191,7 @@ def _proposal(looked: Candidates, best: int, repeats: int, gain: float, sd_if: n
 
 
 def _expected(
-    banks: tuple[_Bank, ...], task: _Task, looked: Candidates, history: list[int], *, blank: bool = False
+    banks: tuple[Bank, ...], task: Task, looked: Candidates, history: list[int], *, blank: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
     """Score of every candidate after those of the history, (k,), and the sd it leaves for each truth, (k, t, f).
 
@@ -250,85 +203,5 @@ def _expected(
     rows[: len(history)] = history
     past[: len(history)] = looked.used[history]
     given = (wi, wo, looked.used & (not blank)), (wi[rows], wo[rows], past)
-    score, sd = _scores(banks, task, *(tuple(jnp.asarray(p) for p in part) for part in given))
+    score, sd = scores(banks, task, *(tuple(jnp.asarray(p) for p in part) for part in given))
     return np.asarray(score), np.asarray(sd)
-
-
-@eqx.filter_jit
-def _scores(banks: tuple[_Bank, ...], task: _Task, candidates: Any, history: Any) -> tuple[Array, Array]:
-    # For "match" the model that needs less discrepancy is the truth, and the other is asked how far off it is.
-    pairs = [(0, 0)] if task.match is None else [(0, 0), task.match]
-    begin = [_ready(banks[k], len(banks[0].truths)) for _, k in pairs]
-    flat = tuple(part.reshape(-1, *part.shape[2:]) for part in history)
-    known = [_taken(banks[t], banks[k], task, state, flat) for (t, k), state in zip(pairs, begin, strict=True)]
-
-    def one(candidate: Any) -> tuple[Array, Array]:
-        ends = [_taken(banks[t], banks[k], task, state, candidate) for (t, k), state in zip(pairs, known, strict=True)]
-        spread = _left(banks[0], ends[0])
-        sd = jnp.sqrt(jnp.diagonal(spread, axis1=1, axis2=2))
-        if task.match is not None:
-            apart = ends[1][3] - known[1][3]
-            return jnp.mean(apart @ jnp.exp(banks[task.match[1]].logs)), sd
-        if task.wanted:
-            return -0.5 * jnp.mean(jnp.log(jnp.mean(sd**2, axis=0)[np.array(task.wanted)])), sd
-        return -0.5 * jnp.mean(jnp.linalg.slogdet(spread)[1]) / sd.shape[1], sd
-
-    return mapped(one, candidates)
-
-
-def _ready(bank: _Bank, truths: int) -> tuple:
-    """What filters carry: ln of their weights (t, e), shifts (t, e, f), covariances (e, f, f), Σ innovation² (t, e)."""
-    logs = jnp.tile(bank.logs, (truths, 1))
-    return logs, jnp.zeros((truths, *bank.centre.shape)), bank.covariance, jnp.zeros_like(logs)
-
-
-def _taken(truth: _Bank, model: _Bank, task: _Task, state: tuple, rows: tuple) -> tuple:
-    """The filters of a model after rows of noise-free measurements of each truth, a rank-1 update for each channel."""
-
-    def row(state: tuple, given: tuple[Array, Array, Array]) -> tuple[tuple, None]:
-        wi, wo, used = given
-
-        def point(t: Array) -> tuple[Array, Array]:
-            x = model.predicted(t, wi, wo)
-            return x, x
-
-        slope, expected = jax.vmap(jax.jacfwd(point, has_aux=True))(model.centre)
-        if truth is model:
-            seen = expected[truth.truths]
-        else:
-            seen = jax.vmap(lambda t: truth.predicted(t, wi, wo))(truth.centre[truth.truths])
-        noise = jnp.hypot(task.law[0] * wi[2], task.law[1] * expected)
-        weight = jnp.where(used, jnp.sqrt(task.repeats), 0.0)
-
-        def z(x: Array) -> Array:
-            return weight * model.loss.transform(x, noise, wi[2], model.s)
-
-        here, steep = jax.jvp(z, (expected,), (jnp.ones_like(expected),))
-        slope, apart = slope * steep[..., None], z(seen[:, None]) - here
-        for channel in range(apart.shape[-1]):
-            state = _assimilated(state, slope[:, channel], apart[..., channel])
-        return state, None
-
-    return jax.lax.scan(row, state, rows)[0]
-
-
-def _assimilated(state: tuple, j: Float[Array, "e f"], apart: Float[Array, "t e"]) -> tuple:
-    """Kalman's update (Sherman & Morrison) of every filter by one datum of unit variance."""
-    logs, shift, covariance, apart_by = state
-    cj = jnp.einsum("eij,ej->ei", covariance, j)
-    variance = 1.0 + jnp.einsum("ei,ei->e", j, cj)
-    innovation = apart - jnp.einsum("tei,ei->te", shift, j)
-    logs = logs - 0.5 * innovation**2 / variance - 0.5 * jnp.log(variance)
-    shift = shift + (innovation / variance)[..., None] * cj
-    covariance = covariance - cj[:, :, None] * cj[:, None, :] / variance[:, None, None]
-    return logs, shift, covariance, apart_by + innovation**2 / variance
-
-
-def _left(bank: _Bank, state: tuple) -> Float[Array, "t f f"]:
-    """Covariance of the mixture under each truth."""
-    logs, shift, covariance, _ = state
-    weight = jax.nn.softmax(logs, axis=1)
-    at = bank.centre + shift
-    apart = at - jnp.einsum("te,tef->tf", weight, at)[:, None]
-    within = jnp.einsum("te,eij->tij", weight, covariance)
-    return within + jnp.einsum("te,tei,tej->tij", weight, apart, apart)

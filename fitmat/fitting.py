@@ -117,7 +117,7 @@ def fit(
     starts = starting_points(template, data, first, held, STARTS)
     added = np.asarray(vector(shown))[len(vector(template)) :]
     starts = np.column_stack([starts, np.tile(added, (len(starts), 1))])
-    ends = jax.device_get(_refine(shown, data, jnp.asarray(starts), first, tuple(int(k) for k in free), max_steps))
+    ends = jax.device_get(refine(shown, data, jnp.asarray(starts), first, tuple(int(k) for k in free), max_steps))
     return conclude(measurements, shown, held, (found_noise, data), ends)
 
 
@@ -158,12 +158,20 @@ def _held(template: AbstractBRDF, fixed: Mapping[str, ArrayLike]) -> dict[str, n
 
 
 @eqx.filter_jit
-def _refine(
+def refine(
     template: AbstractBRDF, data: Data, starts: Array, first: Array, free: tuple[int, ...], max_steps: int
 ) -> Ends:
     """Alternate Levenberg–Marquardt over the parameters and the best discrepancy, from every start.
 
     In a location–scale family the two are information-orthogonal, so that a few rounds settle both.
+
+    Args:
+        template: Gives shapes, bounds and static choices.
+        data: The samples, with their loss and prior.
+        starts: Physical parameter vectors, (k, p), which also hold what is fixed.
+        first: A first guess of the discrepancy.
+        free: Places of the parameters that are fitted.
+        max_steps: Levenberg–Marquardt iterations per start and round.
     """
     chart = Chart(template, free)
 

@@ -102,7 +102,7 @@ def noise_law(value: Float[np.ndarray, " n"], sigma: Float[np.ndarray, " n"]) ->
     return unit * float(max(np.sqrt(a2 / scale[0]), lowest)), float(np.sqrt(b2 / scale[1]))
 
 
-def _curves(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def curves(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Valid rows sorted by curve and angle: their indices, their curve's number, the angle along the curve.
 
     A curve is taken along the sensor's angle, or, where the light's took more values, along that.
@@ -129,7 +129,7 @@ def leave_one_out(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray
     NaN where a row has neither repeats nor two neighbours on either side.
     """
     level, error, factor = (np.full(m.n_samples, np.nan) for _ in range(3))
-    rows, curve, x = _curves(m, channel)
+    rows, curve, x = curves(m, channel)
     if len(rows) == 0:
         return level, error, factor
     y = m.value[rows, channel]

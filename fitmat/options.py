@@ -4,7 +4,7 @@ They set no default and check nothing but their type.
 """
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -208,6 +208,13 @@ Plot = Annotated[
     typer.Option(help="Draw what was measured where into this PNG, SVG or PDF.", metavar="FILE", show_default=False),
 ]
 
+DesignPlot = Annotated[
+    Path | None,
+    typer.Option(
+        help="Draw what each next angle is worth into this PNG, SVG or PDF.", metavar="FILE", show_default=False
+    ),
+]
+
 Converted = Annotated[
     Path,
     typer.Argument(help="File to write: .csv, .parquet, .binary (MERL), .bsdf (Zemax) or .alta.", show_default=False),
@@ -247,7 +254,9 @@ For = Annotated[
     ),
 ]
 
-Kind = Annotated[str, typer.Option(help="What is measured next: one sample, or a whole curve.", metavar="KIND")]
+Kind = Annotated[
+    Literal["sample", "curve"], typer.Option(help="What is measured next: single samples, or whole curves.")
+]
 
 Count = Annotated[int, typer.Option(min=1, max=50, help="How many measurements to propose.", metavar="N")]
 

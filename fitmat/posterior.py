@@ -22,6 +22,7 @@ VERDICTS = {
     "approximate": "Not sampled: a Gaussian around the best fit, which the posterior does not follow well. "
     "Sample it before relying on the intervals.",
     "not sampled": "Not sampled: a Gaussian around the best fit.",
+    "no posterior": "The loss is an objective, not a likelihood: there is a best fit and nothing around it.",
 }
 """How far draws can be trusted, and what that means."""
 
@@ -90,9 +91,11 @@ class Posterior:
 
     @property
     def verdict(self) -> str:
-        """A key of `VERDICTS`: one of the first three for chains, one of the last three for Laplace."""
+        """A key of `VERDICTS`: one of the first three for chains, one of the next three for Laplace."""
         if not self.fit.finite:
             return "unusable"
+        if not self.fit.loss.posterior:
+            return "no posterior"
         if self.diagnostics is None:
             return "not sampled" if self.pareto_k is None else ("corrected", "approximate")[self.pareto_k > GOOD_PARETO]
         d = self.diagnostics
@@ -110,7 +113,7 @@ class Posterior:
     @property
     def usable(self) -> bool:
         """Whether intervals may be taken from these draws."""
-        return self.verdict != "unusable"
+        return self.verdict not in ("unusable", "no posterior")
 
     def _rows(self) -> list[tuple[str, str, str]]:
         channels = self.fit.measurements.channels

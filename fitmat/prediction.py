@@ -15,11 +15,11 @@ from scipy.special import ndtri
 from fitmat.brdf import AbstractBRDF, evaluate, evaluate_pairs
 from fitmat.geometry import from_angles
 from fitmat.likelihood import Data, prepare, residuals
+from fitmat.losses import DEFAULT
 from fitmat.measurement import Measurements
 from fitmat.outcome import Fit
 from fitmat.params import with_vector
 from fitmat.posterior import Posterior
-from fitmat.losses import DEFAULT
 from fitmat.stabilising import from_stabilised, stabilised
 
 BAND_DRAWS = 200

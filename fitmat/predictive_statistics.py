@@ -14,7 +14,7 @@ from scipy import stats
 
 from fitmat.incidences import Incidence
 from fitmat.losses import DEFAULT
-from fitmat.noise import _curves
+from fitmat.noise import curves
 from fitmat.outcome import Fit
 from fitmat.stabilising import from_stabilised
 
@@ -185,7 +185,7 @@ def _neighbours(fit: Fit, used: np.ndarray) -> np.ndarray:
     m, found = fit.measurements, [np.zeros((0, 3), int)]
     place = np.cumsum(m.valid.any(axis=1)) - 1
     for channel in range(len(m.channels)):
-        rows, curve, _ = _curves(m, channel)
+        rows, curve, _ = curves(m, channel)
         rows = place[rows]
         near = (np.diff(curve) == 0) & used[rows[:-1], channel] & used[rows[1:], channel]
         one, other = rows[:-1][near], rows[1:][near]

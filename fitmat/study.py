@@ -30,7 +30,7 @@ class Study:
         match: Of an empirical and a microfacet model among them; None where there is no such pair.
         choice: Which model the data prefer; None under a loss that weighs no models, and of a single model.
         identified: What the angles determine, of `detailed` models.
-        checks: Whether the models can make such data, of the same.
+        checks: Whether the models can make such data, of the same; none under a robust loss, which expects bad values.
         opinions: Of a second sampler, where it was asked for.
     """
 
@@ -73,7 +73,7 @@ def concluded(
     say("asking what the angles determine")
     identified = tuple(identify(p) for p in looked_at)
     say("replicating the data")
-    checks = tuple(check_predictions(p, seed=seed) for p in looked_at)
+    checks = tuple(check_predictions(p, seed=seed) for p in looked_at if not p.fit.loss.robust)
     opinions = []
     for posterior in looked_at if second_opinion else []:
         say(f"sampling {posterior.fit.name} a second time")

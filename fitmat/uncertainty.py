@@ -115,6 +115,11 @@ def _ensemble(fit: Fit, seed: int, walkers: int | None) -> tuple[Any, Any]:
 
     if not fit.finite:
         raise FitmatError(f"{fit.name}: the fit ended {fit.result}, there is nothing to sample; check the data.")
+    if not fit.loss.posterior:
+        raise FitmatError(
+            f"{fit.name}: the loss {fit.loss.name} is an objective, not a likelihood, and has no posterior to sample; "
+            "fit under --loss default."
+        )
     rng = np.random.default_rng(seed)
     walkers = walkers or default_walkers(fit)
     independent = emcee.moves.MHMove(independent_proposal(fit))
@@ -127,10 +132,12 @@ def _ensemble(fit: Fit, seed: int, walkers: int | None) -> tuple[Any, Any]:
 
 
 def _run(fit: Fit, state: Any, seed: int, max_steps: int) -> bytes:
-    """Digest of all that decides a chain: its beginning, the density there, model, data, priors, seed and versions."""
+    """Digest of all that decides a chain: its beginning, the density there, model, data, loss, seed and versions."""
     versions = [f"{name} {importlib.metadata.version(name)}" for name in SAMPLED_BY]
     density = log_posterior(fit, len(state.coords))(state.coords)
-    words = ", ".join([fit.name, f"seed {seed}", f"at most {max_steps} steps", *sorted(fit.held), *versions])
+    words = ", ".join(
+        [fit.name, fit.loss.name, f"seed {seed}", f"at most {max_steps} steps", *sorted(fit.held), *versions]
+    )
     leaves = [np.asarray(leaf) for leaf in jax.tree.leaves((fit.model, fit.data))]
     return digest(words, [state.coords, density, state.random_state[1], *leaves])
 

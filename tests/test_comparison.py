@@ -1,18 +1,28 @@
 """The match: distances by hand and by brute force in numpy, the words of the verdict, the metrics of the literature."""
 
 import dataclasses
+from pathlib import Path
 from typing import Any
 
+import jinja2
 import numpy as np
 import pytest
 from oracles import ggx
 
 import fitmat as fm
-from fitmat.comparison import ALBEDO_ANGLES, Comparison, Estimate, compare
+from fitmat import headline, plots, sphere
+from fitmat.ablation import EXPLAINS, TERMS, Ablation
+from fitmat.brdf import AbstractBRDF
+from fitmat.comparison import ALBEDO_ANGLES, Comparison, compare
+from fitmat.conversion import alpha_from_exponent, exponent_from_alpha, fitted_alpha, fitted_exponent
+from fitmat.distances import METRICS
 from fitmat.errors import FitmatError
+from fitmat.estimate import Estimate
 from fitmat.metrics import fit_metrics
 from fitmat.outcome import Fit
 from fitmat.posterior import Posterior
+from fitmat.regions import GRAZING_DEG, REGIONS
+from fitmat.telling import SEPARATED, Telling
 
 EXACT = 1e-9
 """Relative; where both models are constant the quadrature cancels."""
@@ -22,6 +32,9 @@ CUBE = 1e-3
 
 BRUTE = 5e-3
 """Relative; midpoint rules of 90 × 90 × 90 here and the library's own rule, each within 2e-3 for these wide lobes."""
+
+SETTINGS = 0.25
+"""In ln of the width: about twice the rms error that the corrections state for these widths."""
 
 GREY = {"empirical": {"kd": 0.25, "ks": 0.0, "exponent": 30.0}, "microfacet": {"kd": 0.2, "ks": 0.0, "alpha": 0.3}}
 """Lobes of weight 0: only the diffuse parts differ, by a quarter of the microfacet model's."""
@@ -40,7 +53,7 @@ def fits(plastic: fm.Measurements) -> tuple[Fit, Fit]:
 
 @pytest.fixture(scope="module")
 def match(fits: tuple[Fit, Fit]) -> Comparison:
-    return compare(*(fm.laplace(fit, seed=1) for fit in fits))
+    return compare(*(fm.laplace(fit, seed=1) for fit in fits), spheres=False)
 
 
 def certain(fit: Fit, values: dict[str, Any]) -> Posterior:
@@ -51,7 +64,7 @@ def certain(fit: Fit, values: dict[str, Any]) -> Posterior:
 
 
 def pair(fits: tuple[Fit, Fit], empirical: dict[str, Any], microfacet: dict[str, Any]) -> Comparison:
-    return compare(certain(fits[0], empirical), certain(fits[1], microfacet))
+    return compare(certain(fits[0], empirical), certain(fits[1], microfacet), spheres=False)
 
 
 def test_diffuse_surfaces_differ_as_computed_by_hand(fits: tuple[Fit, Fit]) -> None:
@@ -119,7 +132,7 @@ def test_only_the_measured_incidences_count_where_said(fits: tuple[Fit, Fit]) ->
 
 
 def test_the_order_of_arguments_does_not_matter(fits: tuple[Fit, Fit], match: Comparison) -> None:
-    other = compare(*(fm.laplace(fit, seed=1) for fit in reversed(fits)))
+    other = compare(*(fm.laplace(fit, seed=1) for fit in reversed(fits)), spheres=False)
     assert other.verdict == match.verdict
     assert other.hemisphere_distance == match.hemisphere_distance
     assert other.delta_bic == match.delta_bic
@@ -183,6 +196,136 @@ def test_the_verdict_warns_of_unfinished_fits(match: Comparison, result: str) ->
     assert match.microfacet.fit.adequacy in match.verdict
 
 
+def test_widths_beside_each_other(fits: tuple[Fit, Fit]) -> None:
+    """√(2/(n+2)) = 0.25 for n = 30, beside α = 0.1."""
+    found = pair(fits, GREY["empirical"], {"kd": 0.2, "ks": 0.0, "alpha": 0.1})
+    widths = found.implied_alpha, found.fitted_alpha, found.width_ratio
+    assert [w.value for w in widths if w is not None] == pytest.approx([0.25, 0.1, 2.5])
+
+
+def test_the_match_asks_what_an_eye_sees(fits: tuple[Fit, Fit], monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the best fits in the first row, and its sentence in the verdict."""
+    asked = []
+
+    def look(*given: Any) -> Any:
+        asked.append(given)
+        return type("Seen", (), {"words": "An eye would wonder."})()
+
+    monkeypatch.setattr(sphere, "perceived", look)
+    found = compare(*(fm.laplace(fit, seed=1) for fit in fits))
+    empirical, microfacet, draws, channels = asked[0]
+    assert (empirical.name, microfacet.name, channels) == ("lambert+blinn-phong", "lambert+ggx", ("value",))
+    for fit, values in zip(fits, draws, strict=True):
+        assert np.asarray(values[0]) == pytest.approx(fit.values)
+    assert "An eye would wonder." in found.verdict
+
+
+def test_each_model_imitates_the_other(match: Comparison) -> None:
+    """No Blinn–Phong is closer to the fitted GGX than the best imitation, least of all the fitted one."""
+    both = {(found.model.name, found.metric): found for found in match.imitations}
+    assert len(both) == 8
+    for metric in ("relative", "ngan", "cube-root", "log-ratio"):
+        best = both["lambert+blinn-phong", metric]
+        assert best.of == "lambert+ggx"
+        assert best.distance <= match.distances.whole[metric].value * (1 + BRUTE)
+        assert both["lambert+ggx", metric].of == "lambert+blinn-phong"
+
+
+def telling(separation: list[float], rms: list[float], every: float) -> Telling:
+    """The same at best and in all draws; 10°, 30° and 70°."""
+    d, hidden = (np.tile(np.array(x), (3, 1)) for x in (separation, rms))
+    angles = np.array([10.0, 30.0, 70.0])
+    return Telling(
+        angles, np.full(3, 9), hidden, hidden, d, (SEPARATED / d) ** 2, Estimate(every, (every, every)), True
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (([1.0, 1.0, 1.0], [0.3, 0.3, 0.3], 1.96), "cannot tell them apart; that would take 4 times as many readings."),
+        (([3.0, 3.0, 3.0], [0.9, 0.9, 0.9], 5.2), "Only all incidences together tell them apart, no single one does."),
+        (([3.0, 3.0, 9.0], [1.0, 1.0, 3.0], 9.9), "Up to 30° incidence this instrument cannot tell blinn from ggx,"),
+        (([6.0, 3.0, 9.0], [0.9, 0.9, 3.0], 9.9), "Up to 30° incidence their difference is within the noise of a sing"),
+        (([6.0, 6.0, 6.0], [0.9, 0.9, 0.9], 9.9), "Everywhere their difference is within the noise of a single readin"),
+        (([6.0, 6.0, 6.0], [1.9, 0.9, 0.9], 9.9), "This instrument tells them apart at every incidence measured."),
+    ],
+)
+def test_the_headline_says_what_the_instrument_can_tell(given: tuple[Any, ...], words: str) -> None:
+    sentence = headline.telling_sentence(("blinn", "ggx"), telling(*given))
+    assert sentence is not None
+    assert words in sentence
+
+
+def test_the_headline_keeps_quiet_where_the_noise_is_unknown() -> None:
+    unknown = dataclasses.replace(telling([6.0] * 3, [2.0] * 3, 9.9), known=False)
+    assert headline.telling_sentence(("blinn", "ggx"), unknown) is None
+
+
+def test_the_headline_says_what_is_missing_at_grazing_incidence_and_why(match: Comparison) -> None:
+    ablation = match.ablation
+    assert isinstance(ablation, Ablation)
+    certain = {
+        "fresnel": Estimate(0.5, (0.4, 0.6)),
+        "tail": Estimate(0.1, (0.0, 0.2)),
+        "all": Estimate(1.0, (1.0, 1.0)),
+    }
+    known = dataclasses.replace(ablation, grazing=certain)
+    sentence = headline.grazing_sentence(("blinn", "ggx"), Estimate(-0.38, (-0.42, -0.34)), known)
+    assert sentence == "Beyond 70° blinn reflects 38 % less than ggx (34–42 %): it has no Fresnel term."
+    without = headline.grazing_sentence(("blinn", "ggx"), Estimate(0.12, (0.1, 0.14)), None)
+    assert without == "Beyond 70° blinn reflects 12 % more than ggx (10–14 %)."
+    for little in (Estimate(-0.04, (-0.05, -0.03)), Estimate(-0.38, (-0.8, 0.04))):
+        assert headline.grazing_sentence(("blinn", "ggx"), little, known) is None
+
+
+def test_the_pictures_show_the_numbers(match: Comparison) -> None:
+    """Lines by their labels, against incidence in degrees."""
+    ablation = match.ablation
+    assert ablation is not None
+    angle = np.rad2deg(match.distances.theta_i)
+    shown = {
+        plots.plot_distances(match, "albedo"): {"all directions": match.distances.by_incidence["albedo"][1]},
+        plots.plot_ablation(ablation): {term: 100 * ablation.fall[term][1] for term in ("fresnel", "masking", "tail")},
+    }
+    for ax, expected in shown.items():
+        drawn = {line.get_label(): line.get_xydata() for line in ax.lines}
+        for label, values in expected.items():
+            np.testing.assert_allclose(drawn[label], np.stack([angle, values], axis=1))
+    ax = plots.plot_telling(match.telling)
+    points = {box.get_label(): box[0].get_xydata() for box in ax.containers}
+    np.testing.assert_allclose(points["all readings"][:, 1], match.telling.separation[1])
+    np.testing.assert_allclose(points["a single reading"][:, 1], match.telling.rms[1])
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_the_page_tells_the_match_in_words(match: Comparison, known: bool) -> None:
+    """Every variable is there, and the sentences say what the numbers do."""
+    folder = jinja2.FileSystemLoader(Path(headline.__file__).with_name("templates"))
+    environment = jinja2.Environment(loader=folder, autoescape=True, undefined=jinja2.StrictUndefined)
+    environment.filters["png"] = str
+    telling = dataclasses.replace(match.telling, known=known)
+    one = dataclasses.replace(match, telling=telling, ablation=match.ablation if known else None)
+    one.__dict__["imitations"] = match.imitations  # what is cached is not asked for twice
+    page = environment.get_template("match.html").render(
+        match=one,
+        regions=REGIONS,
+        metrics_of_match=METRICS,
+        terms=TERMS,
+        close=headline.CLOSE,
+        similar=headline.SIMILAR,
+        separated=SEPARATED,
+        explains=EXPLAINS,
+        grazing_deg=GRAZING_DEG,
+        **dict.fromkeys(("distances_figure", "ablation_figure", "telling_figure"), "picture"),
+    )
+    assert ("reflects" in page) is known
+    assert ("the readings tell" in page or "tells the two models apart" in page or "cannot tell" in page) is known
+    assert ("The noise of the measurements is not known" in page) is not known
+    assert f"{match.distances.whole['ngan'].value:.3g} <span" in page
+    assert page.count("lambert+ggx by lambert+blinn-phong") == 4
+
+
 def test_what_cannot_be_compared_is_refused(fits: tuple[Fit, Fit]) -> None:
     blinn, facets = (fm.laplace(fit, seed=1) for fit in fits)
     with pytest.raises(
@@ -235,3 +378,24 @@ def test_a_fit_has_the_peak_of_its_data(fits: tuple[Fit, Fit]) -> None:
     ratio = fit_metrics(spoilt)["peak_ratio"]
     assert ratio is not None
     assert ratio < 0.9
+
+
+def measured(truth: AbstractBRDF) -> fm.Measurements:
+    lights, sensor = np.deg2rad([10.0, 30.0, 50.0, 70.0]), np.deg2rad(np.arange(-70.0, 81.0, 10.0))
+    return fm.simulate(truth, lights, sensor, relative_noise=0.02, absolute_noise=1e-3, seed=7)
+
+
+@pytest.mark.parametrize("alpha", [0.1, 0.2, 0.5])
+def test_exponents_are_recovered_from_simulated_ggx(alpha: float) -> None:
+    found = fm.fit(measured(fm.model("lambert+ggx", kd=0.3, alpha=alpha, eta=1.5)), "lambert+blinn-phong")
+    width = np.log(alpha_from_exponent(found.values[2]))
+    assert width == pytest.approx(np.log(alpha_from_exponent(fitted_exponent(alpha))), abs=SETTINGS)
+
+
+@pytest.mark.parametrize("alpha", [0.1, 0.2, 0.5])
+def test_slopes_are_recovered_from_simulated_blinn_phong(alpha: float) -> None:
+    n = exponent_from_alpha(alpha)
+    truth = fm.model("lambert+blinn-phong", kd=0.3, ks=0.04 * (n + 2) / (n + 8), exponent=n)
+    found = fm.fit(measured(truth), "lambert+ggx")
+    place = next(e.place for e in found.entries if e.name == "alpha")
+    assert np.log(found.values[place][0]) == pytest.approx(np.log(fitted_alpha(n)), abs=SETTINGS)

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 import fitmat
-from fitmat import console
+from fitmat import console, screen
 from fitmat.errors import ModelError
 from fitmat.posterior import Posterior
+from fitmat.study import Study
 from fitmat.synthetic import simulate
 
 
@@ -18,9 +19,9 @@ def posterior() -> Posterior:
     truth = fitmat.model("lambert+ggx", channels=3, kd=np.array([0.4, 0.1, 0.2]), alpha=0.3)
     angles = np.deg2rad([20, 45, 70]), np.deg2rad(np.arange(-80, 81, 10))
     made = simulate(truth, *angles, relative_noise=0.02, absolute_noise=1e-3, seed=1)
-    posteriors, match = console.study(made, {"lambert+ggx": {}}, fixed={}, masking=None, sampling=False, seed=0)
-    assert match is None
-    return posteriors[0]
+    found = console.study(made, console.Plan({"lambert+ggx": {}}, sampling=False))
+    assert found.match is None
+    return found.posteriors[0]
 
 
 @pytest.fixture(autouse=True)
@@ -38,7 +39,7 @@ def test_no_model_name():
 
 
 def test_show_fits_80_columns(posterior, capsys, tmp_path):
-    console.show([posterior], None, tmp_path)
+    screen.show(Study((posterior,)), tmp_path)
     out = capsys.readouterr().out
     lines = out.splitlines()
     assert max(map(len, (line for line in lines if str(tmp_path) not in line))) <= 80
@@ -51,7 +52,7 @@ def test_show_fits_80_columns(posterior, capsys, tmp_path):
 
 def test_show_names_the_outcome(posterior, capsys, tmp_path):
     fit = dataclasses.replace(posterior.fit, result="unidentifiable", undetermined=("eta",))
-    console.show([dataclasses.replace(posterior, fit=fit, interrupted=True)], None, tmp_path)
+    screen.show(Study((dataclasses.replace(posterior, fit=fit, interrupted=True),)), tmp_path)
     out = capsys.readouterr().out
     assert "unidentifiable: At least one parameter is not determined" in out
     assert "interrupted: sampling was stopped" in out
@@ -61,7 +62,7 @@ def test_show_names_the_outcome(posterior, capsys, tmp_path):
 def test_brackets_in_names_are_text(posterior, capsys, tmp_path):
     measurements = dataclasses.replace(posterior.fit.measurements, source="[red]x.csv", channels=("[bold]", "g", "b"))
     fit = dataclasses.replace(posterior.fit, measurements=measurements)
-    console.show([dataclasses.replace(posterior, fit=fit)], None, tmp_path / "[dim]")
+    screen.show(Study((dataclasses.replace(posterior, fit=fit),)), tmp_path / "[dim]")
     out = capsys.readouterr().out
     assert all(text in out for text in ("[red]x.csv", "kd [bold]", "[dim]/report.html"))
 
@@ -70,36 +71,36 @@ def test_options_go_to_the_models_that_have_them(posterior):
     fixed = {"exponent": np.array([20.0]), "kd": np.array([0.3])}
     names = ["lambert+phong", "lambert+ggx"]
     measurements = posterior.fit.measurements
-    posteriors, match = console.study(
-        measurements, {name: {} for name in names}, fixed=fixed, masking="separable", sampling=False, seed=0
-    )
-    assert [sorted(p.fit.held) for p in posteriors] == [["exponent", "kd"], ["kd"]]
-    assert match is not None
+    plan = console.Plan({name: {} for name in names}, fixed, masking="separable", sampling=False)
+    found = console.study(measurements, plan)
+    assert [sorted(p.fit.held) for p in found.posteriors] == [["exponent", "kd"], ["kd"]]
+    assert found.match is not None
 
 
 @pytest.mark.parametrize(
-    ("fixed", "masking", "sentence"),
+    ("chosen", "sentence"),
     [
-        ({"zz": np.array([1.0])}, None, r"--fix zz: no model of lambert has it; they have kd\."),
-        ({}, "separable", "--masking separable: none of lambert has a masking to choose"),
+        ({"fixed": {"zz": np.array([1.0])}}, r"--fix zz: no model of lambert has it; they have kd\."),
+        ({"priors": {"eta": (1.5, 0.1)}}, r"--prior eta: no model of lambert has it; they have kd\."),
+        ({"masking": "separable"}, "--masking separable: none of lambert has a masking to choose"),
     ],
 )
-def test_options_that_concern_no_model(posterior, fixed, masking, sentence):
+def test_options_that_concern_no_model(posterior, chosen, sentence):
     measurements = posterior.fit.measurements
     with pytest.raises(ModelError, match=sentence):
-        console.study(measurements, {"lambert": {}}, fixed=fixed, masking=masking, sampling=False, seed=0)
+        console.study(measurements, console.Plan({"lambert": {}}, sampling=False, **chosen))
 
 
 def test_handler_is_restored_after_sampling(posterior, monkeypatch):
     before = signal.getsignal(signal.SIGINT)
     seen = []
 
-    def sample(found, *, seed, progress):
+    def sample(found, *, seed, progress, checkpoint):
         seen.append(signal.getsignal(signal.SIGINT))
         progress(1, 2)
         return posterior
 
     monkeypatch.setattr(console, "sample", sample)
-    console.study(posterior.fit.measurements, {"lambert+ggx": {}}, fixed={}, masking=None, sampling=True, seed=0)
+    console.study(posterior.fit.measurements, console.Plan({"lambert+ggx": {}}))
     assert seen[0] is not before
     assert signal.getsignal(signal.SIGINT) is before

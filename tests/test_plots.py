@@ -27,11 +27,9 @@ def studied() -> tuple[list[Posterior], Comparison]:
     valid = made.valid.copy()
     valid[0, 1] = False
     made = dataclasses.replace(made, valid=valid)
-    posteriors, match = console.study(
-        made, {name: {} for name in NAMES}, fixed={}, masking=None, sampling=False, seed=0
-    )
-    assert match is not None
-    return posteriors, match
+    found = console.study(made, console.Plan({name: {} for name in NAMES}, sampling=False))
+    assert found.match is not None
+    return list(found.posteriors), found.match
 
 
 def labelled(ax: Axes) -> dict[str, np.ndarray]:

@@ -14,14 +14,12 @@ import numpy as np
 import pytest
 
 import fitmat
-from fitmat import console, report
-from fitmat.comparison import Comparison
+from fitmat import console, record, report
 from fitmat.display import interval, with_error
 from fitmat.measurement import Measurements
-from fitmat.posterior import Posterior
+from fitmat.study import Study
 from fitmat.synthetic import simulate
 
-Study = tuple[list[Posterior], Comparison | None]
 NAMES = ["lambert+blinn-phong", "lambert+ggx"]
 
 
@@ -35,12 +33,12 @@ def paint() -> Measurements:
 
 @pytest.fixture(scope="module")
 def studied() -> Study:
-    return console.study(paint(), {name: {} for name in NAMES}, fixed={}, masking=None, sampling=False, seed=0)
+    return console.study(paint(), console.Plan({name: {} for name in NAMES}, sampling=False))
 
 
 @pytest.fixture(scope="module")
 def page(studied: Study) -> str:
-    return report.to_html(*studied)
+    return report.to_html(studied)
 
 
 class Page(html.parser.HTMLParser):
@@ -115,27 +113,27 @@ def test_nothing_is_fetched(page):
 def test_names_are_escaped(studied):
     """A file and a channel may be called anything."""
     evil = "<script>alert(1)</script>"
-    posterior = studied[0][0]
+    posterior = studied.posteriors[0]
     measurements = dataclasses.replace(
         posterior.fit.measurements, source=evil, channels=(evil, "g", "b"), notes=(evil,), masked={evil: 1}
     )
     fit = dataclasses.replace(posterior.fit, measurements=measurements)
-    found = Page(report.to_html([dataclasses.replace(posterior, fit=fit)], None))
+    found = Page(report.to_html(Study((dataclasses.replace(posterior, fit=fit),))))
     assert "script" not in found.tags
     assert found.text.count(evil) >= 4
 
 
 def test_outcomes_are_labelled(studied):
-    posterior = studied[0][1]
+    posterior = studied.posteriors[1]
     odd = dataclasses.replace(posterior.fit, result="unidentifiable", undetermined=("eta", "ks"))
-    text = Page(report.to_html([dataclasses.replace(posterior, fit=odd, interrupted=True)], None)).text
+    text = Page(report.to_html(Study((dataclasses.replace(posterior, fit=odd, interrupted=True),)))).text
     assert "lambert+ggx: unidentifiable. At least one parameter is not determined by these angles: fix it" in text
     assert "Not determined: ks, eta." in text or "Not determined: eta, ks." in text
     assert "sampling was interrupted; what was done is kept" in text
 
 
 def test_json_has_the_agreed_keys(studied):
-    found = json.loads(json.dumps(report.to_dict(*studied), allow_nan=False))
+    found = json.loads(json.dumps(record.to_dict(studied), allow_nan=False))
     assert {"file", "n_samples", "n_masked", "channels", "fits", "match"} <= set(found)
     assert (found["file"], found["n_samples"], found["n_masked"]) == ("paint.csv", 51, 0)
     assert found["channels"] == ["r", "g", "b"]
@@ -153,11 +151,11 @@ def test_json_has_the_agreed_keys(studied):
         assert match[key]["ci95"][0] <= match[key]["ci95"][1]
         assert math.isfinite(match[key]["value"])
     assert 0 <= match["albedo_gap_max"]["theta_i_deg"] <= 85
-    assert match["verdict"] == studied[1].verdict
+    assert match["verdict"] == studied.match.verdict
 
 
 def test_json_lists_channels_and_not_what_they_share(studied):
-    parameters = report.to_dict(*studied)["fits"][1]["parameters"]
+    parameters = record.to_dict(studied)["fits"][1]["parameters"]
     assert np.shape(parameters["kd"]["value"]) == np.shape(parameters["kd"]["sd"]) == (3,)
     assert np.shape(parameters["kd"]["ci95"]) == (3, 2)
     # 51 samples of 2 % in each channel give kd to about 1 %: five standard deviations.
@@ -167,9 +165,9 @@ def test_json_lists_channels_and_not_what_they_share(studied):
 
 
 def test_json_has_null_for_what_is_not_finite(studied):
-    posterior = studied[0][0]
+    posterior = studied.posteriors[0]
     fit = dataclasses.replace(posterior.fit, log_likelihood=math.nan, covariance=posterior.fit.covariance * math.inf)
-    found: dict[str, Any] = report.to_dict([dataclasses.replace(posterior, fit=fit)], None)
+    found: dict[str, Any] = record.to_dict(Study((dataclasses.replace(posterior, fit=fit),)))
     text = json.dumps(found, allow_nan=False)
     assert json.loads(text)["fits"][0]["bic"] is None
     assert found["match"] is None
@@ -178,12 +176,12 @@ def test_json_has_null_for_what_is_not_finite(studied):
 def test_write_makes_every_file(studied, tmp_path):
     import xarray
 
-    report.write(tmp_path, *studied)
+    report.write(tmp_path, studied)
     names = ["fit.json", *(f"posterior-{name}.nc" for name in NAMES), "report.html"]
     assert sorted(path.name for path in tmp_path.iterdir()) == names
     draws = xarray.open_dataset(tmp_path / names[2], group="posterior", engine="h5netcdf")
-    assert draws["kd"].shape == (1, len(studied[0][1].values), 3)
-    assert float(draws["alpha"].mean()) == pytest.approx(studied[0][1].values[:, -2].mean())
+    assert draws["kd"].shape == (1, len(studied.posteriors[1].values), 3)
+    assert float(draws["alpha"].mean()) == pytest.approx(studied.posteriors[1].values[:, -2].mean())
 
 
 @pytest.mark.parametrize(
@@ -218,7 +216,7 @@ def test_intervals_have_the_digits_of_their_value(low, high, sd, text):
 
 
 def test_what_is_not_determined_shows_no_error(studied):
-    posterior = studied[0][1]
+    posterior = studied.posteriors[1]
     fit = dataclasses.replace(posterior.fit, result="unidentifiable", undetermined=("eta",))
     found = {row["name"]: row for row in report.rows(dataclasses.replace(posterior, fit=fit))}
     for name in ("eta", "f0"):

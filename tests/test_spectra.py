@@ -1,0 +1,141 @@
+"""Colours and their differences against published numbers and the formulas of the standards."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from fitmat import spectra
+from fitmat.spectra import colouring, delta_e_2000, delta_e_itp
+
+PRINTED = 5e-5
+"""ΔE2000; Sharma's table has four digits after the point."""
+
+ROUNDED = 2e-4
+"""XYZ and chromaticities; sRGB's matrix has four digits, CIE's white point five."""
+
+STANDARD = 1e-3
+"""ΔE_ITP, relative; the matrix of BT.2020 from its chromaticities here, rounded to four digits by some."""
+
+WHITE = np.array([0.3127 / 0.3290, 1.0, (1 - 0.3127 - 0.3290) / 0.3290])
+
+SHARMA = np.array(
+    """50 2.6772 -79.7751 50 0 -82.7485 2.0425; 50 3.1571 -77.2803 50 0 -82.7485 2.8615
+    50 2.8361 -74.02 50 0 -82.7485 3.4412; 50 -1.3802 -84.2814 50 0 -82.7485 1.0
+    50 -1.1848 -84.8006 50 0 -82.7485 1.0; 50 -0.9009 -85.5211 50 0 -82.7485 1.0
+    50 0 0 50 -1 2 2.3669; 50 -1 2 50 0 0 2.3669
+    50 2.49 -0.001 50 -2.49 0.0009 7.1792; 50 2.49 -0.001 50 -2.49 0.0011 7.2195
+    50 2.49 -0.001 50 -2.49 0.0012 7.2195; 50 -0.001 2.49 50 0.0009 -2.49 4.8045
+    50 -0.001 2.49 50 0.0011 -2.49 4.7461; 50 2.5 0 50 0 -2.5 4.3065
+    50 2.5 0 73 25 -18 27.1492; 50 2.5 0 61 -5 29 22.8977
+    50 2.5 0 56 -27 -3 31.9030; 50 2.5 0 58 24 15 19.4535
+    50 2.5 0 50 3.1736 0.5854 1.0; 50 2.5 0 50 3.2972 0 1.0
+    50 2.5 0 50 1.8634 0.5757 1.0; 50 2.5 0 50 3.2592 0.335 1.0
+    60.2574 -34.0099 36.2677 60.4626 -34.1751 39.4387 1.2644; 63.0109 -31.0961 -5.8663 62.8187 -29.7946 -4.0864 1.2630
+    61.2901 3.7196 -5.3901 61.4292 2.2480 -4.9620 1.8731; 35.0831 -44.1164 3.7933 35.0232 -40.0716 1.5901 1.8645
+    22.7233 20.0904 -46.6940 23.0331 14.9730 -42.5619 2.0373; 36.4612 47.8580 18.3852 36.2715 50.5065 21.2231 1.4146
+    90.8027 -2.0831 1.4410 91.1528 -1.6435 0.0447 1.4441; 90.9257 -0.5406 -0.9208 88.6381 -0.8985 -0.7239 1.5381
+    6.7747 -0.2908 -2.4247 5.8714 -0.0985 -2.2286 0.6377; 2.0776 0.0795 -1.1350 0.9033 -0.0636 -0.5514 0.9082
+    """.replace(";", " ").split(),
+    float,
+).reshape(-1, 7)
+"""Sharma, Wu & Dalal 2005, table 1: two colours in L*a*b* and their ΔE2000.
+
+Left out are pairs 10 and 14: opposite hues to the last digit, where the formula jumps and rounding decides.
+"""
+
+
+def to_xyz(lab: np.ndarray) -> np.ndarray:
+    """CIE 15:2018, the inverse of eqs. 8.3–8.8, white at Y = 1."""
+    f = (lab[:, :1] + 16) / 116 + np.stack([lab[:, 1] / 500, 0 * lab[:, 1], -lab[:, 2] / 200], axis=1)
+    return WHITE * np.where(f > 6 / 29, f**3, 3 * (6 / 29) ** 2 * (f - 4 / 29))
+
+
+def test_colour_differences_are_those_that_sharma_printed() -> None:
+    assert len(SHARMA) == 32
+    found = delta_e_2000(to_xyz(SHARMA[:, :3]), to_xyz(SHARMA[:, 3:6]))
+    np.testing.assert_allclose(found, SHARMA[:, 6], atol=PRINTED)
+
+
+def test_itp_differences_follow_the_recommendations() -> None:
+    """BT.2100-2, table 4 (PQ) and table 7 (LMS, ICtCp), BT.2124-0, annex 1; white has 203 cd/m²."""
+    primaries = np.array([[0.708, 0.292], [0.170, 0.797], [0.131, 0.046]])
+    columns = np.stack([primaries[:, 0] / primaries[:, 1], np.ones(3), (1 - primaries.sum(axis=1)) / primaries[:, 1]])
+    to_rgb = np.linalg.inv(columns * np.linalg.solve(columns, WHITE))
+    to_lms = np.array([[1688, 2146, 262], [683, 2951, 462], [99, 309, 3688]]) / 4096
+    to_ictcp = np.array([[2048, 2048, 0], [6610, -13613, 7003], [17933, -17390, -543]]) / 4096
+
+    def ictcp(xyz: np.ndarray) -> np.ndarray:
+        y = (203.0 * xyz @ to_rgb.T @ to_lms.T / 10_000) ** (2610 / 16384)
+        return ((3424 / 4096 + 2413 / 128 * y) / (1 + 2392 / 128 * y)) ** (2523 / 32) @ to_ictcp.T
+
+    rng = np.random.default_rng(1)
+    one = np.abs(WHITE * rng.uniform(0.01, 2.0, (50, 1)) * (1 + 0.1 * rng.normal(size=(50, 3))))
+    other = one * (1 + 0.05 * rng.normal(size=(50, 3)))
+    apart = ictcp(one) - ictcp(other)
+    expected = 720 * np.sqrt(apart[:, 0] ** 2 + (apart[:, 1] / 2) ** 2 + apart[:, 2] ** 2)
+    np.testing.assert_allclose(delta_e_itp(one, other), expected, rtol=STANDARD)
+    assert delta_e_itp(60.0 * WHITE[None], 70.0 * WHITE[None]).item() == pytest.approx(0.0, abs=1e-6)  # both at the top
+
+
+def test_red_green_and_blue_have_the_primaries_of_srgb() -> None:
+    """IEC 61966-2-1: the chromaticities, D65 as white, and the encoding of a grey card, 1.055·0.18^(1/2.4) − 0.055."""
+    weights = colouring(("b", "R", "g")).weights[[1, 2, 0]]
+    expected = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]]
+    np.testing.assert_allclose((weights / weights.sum(axis=1, keepdims=True))[:, :2], expected, atol=ROUNDED)
+    np.testing.assert_allclose(weights.sum(axis=0), WHITE, atol=ROUNDED)
+    np.testing.assert_allclose(
+        spectra.to_srgb(0.18 * weights.sum(axis=0)), 1.055 * 0.18 ** (1 / 2.4) - 0.055, atol=1e-4
+    )
+
+
+def test_a_display_shows_nothing_brighter_than_white() -> None:
+    weights = colouring(("r", "g", "b")).weights
+    np.testing.assert_allclose(spectra.shown(5.0 * weights.sum(axis=0)), weights.sum(axis=0), atol=1e-9)
+    np.testing.assert_allclose(spectra.shown(np.array([2.0, 0.5, -0.1]) @ weights), np.array([1, 0.5, 0]) @ weights)
+
+
+def test_a_flat_spectrum_is_white_and_a_line_has_its_own_colour() -> None:
+    """CIE 15:2018: white of D65 is 95.04, 100, 108.88; chromaticity of light of 520 nm is 0.0743, 0.8338."""
+    names = tuple(f"{w:g}nm" for w in np.arange(780, 379, -10))
+    weights = colouring(names).weights
+    np.testing.assert_allclose(weights.sum(axis=0), [0.9504, 1.0, 1.0888], atol=ROUNDED)
+    np.testing.assert_allclose(colouring(names[::-1]).weights[::-1], weights, rtol=1e-12)  # in any order
+    fine = tuple(str(w) for w in range(380, 781))
+    green = colouring(fine).weights[fine.index("520")]
+    np.testing.assert_allclose(green[:2] / green.sum(), [0.0743, 0.8338], atol=ROUNDED)
+
+
+@pytest.mark.parametrize(
+    ("channels", "words"),
+    [
+        (("value",), "one channel, drawn grey"),
+        (("1", "2"), "1 to 2 nm do not cover what an eye sees: drawn grey, from the mean of the channels"),
+        (("450", "550", "650"), "450 to 650 nm do not cover what an eye sees: drawn grey"),
+        (("400", "500", "600", "700"), "wavelengths 100 nm apart are too coarse for a colour: drawn grey"),
+        (("s", "p"), "channels s, p have no known colour: drawn grey, from their mean"),
+        (("500", "500"), "channels 500, 500 have no known colour"),
+    ],
+)
+def test_what_has_no_colour_is_grey_and_says_so(channels: tuple[str, ...], words: str) -> None:
+    found = colouring(channels)
+    assert found.words.startswith(words)
+    np.testing.assert_allclose(found.weights, np.tile(WHITE / len(channels), (len(channels), 1)), atol=ROUNDED)
+
+
+def test_tristimulus_values_are_taken_as_they_are() -> None:
+    np.testing.assert_array_equal(colouring(("y", "x", "z")).weights, np.eye(3)[[1, 0, 2]])
+
+
+def test_the_colour_library_is_loaded_late_and_leaves_warnings_alone() -> None:
+    code = """
+import sys, warnings
+from fitmat import spectra
+assert "colour" not in sys.modules
+before = list(warnings.filters)
+spectra.colouring(("r", "g", "b"))
+assert "colour" in sys.modules and warnings.filters == before
+"""
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
