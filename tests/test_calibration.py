@@ -119,6 +119,15 @@ def test_too_much_noise_told_is_found_as_too_wide_intervals() -> None:
     assert wrong.coverage()[1, 0] == pytest.approx(0.864, abs=3 * np.sqrt(0.864 * 0.136 / SIMULATIONS))
 
 
+def test_chains_are_ranked_as_well() -> None:
+    seen: list[tuple[int, int]] = []
+    few = lambert(simulations=2, method="emcee", progress=lambda done, of: seen.append((done, of)))
+    assert few.method == "emcee"
+    assert few.trusted.all()
+    assert ((few.ranks >= 0) & (few.ranks <= DRAWS)).all()
+    assert seen == [(1, 2), (2, 2)]
+
+
 def test_calibrations_are_joined(right: Calibration) -> None:
     twice = join([right, right])
     assert twice.ranks.shape == (2 * SIMULATIONS, 3)

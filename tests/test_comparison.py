@@ -289,7 +289,7 @@ def test_the_pictures_show_the_numbers(match: Comparison) -> None:
         plots.plot_ablation(ablation): {term: 100 * ablation.fall[term][1] for term in ("fresnel", "masking", "tail")},
     }
     for ax, expected in shown.items():
-        drawn = {line.get_label(): line.get_xydata() for line in ax.lines}
+        drawn = {line.get_label(): np.asarray(line.get_xydata()) for line in ax.lines}
         for label, values in expected.items():
             np.testing.assert_allclose(drawn[label], np.stack([angle, values], axis=1))
     ax = plots.plot_telling(match.telling)

@@ -5,6 +5,7 @@ import functools
 import json
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from PIL import Image
@@ -14,6 +15,7 @@ from fitmat import planning
 from fitmat.candidates import Limits, proposed
 from fitmat.design import Design, Proposal
 from fitmat.errors import FitmatError, OutputError
+from fitmat.filter_bank import _assimilated
 from fitmat.outcome import Fit
 
 CATALOGUE = Path(__file__).parents[1] / "data" / "synthetic"
@@ -75,6 +77,23 @@ def test_a_sample_of_a_lambert_surface_adds_what_every_other_does(lambert: Fit, 
     assert design.sd == pytest.approx([np.pi * 0.01 / np.sqrt(60)], rel=CLOSED)
     np.testing.assert_allclose(design.gains, np.sqrt(63 / 60), rtol=CLOSED)
     assert design.proposals[1].sd == pytest.approx([np.pi * 0.01 / np.sqrt(66)], rel=CLOSED)
+
+
+def test_a_filter_is_the_gaussian_posterior() -> None:
+    """Five data one after the other, against the normal equations and the density of all five together."""
+    rng = np.random.default_rng(1)
+    root, slopes, data = rng.normal(size=(3, 3)), rng.normal(size=(5, 3)), rng.normal(size=5)
+    prior = root @ root.T
+    state = (jnp.zeros((1, 1)), jnp.zeros((1, 1, 3)), jnp.asarray(prior)[None], jnp.zeros((1, 1)))
+    for slope, datum in zip(slopes, data, strict=True):
+        state = _assimilated(state, jnp.asarray(slope)[None], jnp.full((1, 1), datum))
+    logs, shift, covariance, squares = (np.asarray(part).squeeze() for part in state)
+    after = np.linalg.inv(np.linalg.inv(prior) + slopes.T @ slopes)
+    np.testing.assert_allclose(covariance, after, rtol=1e-9)  # rounding
+    np.testing.assert_allclose(shift, after @ slopes.T @ data, rtol=1e-9)
+    joint = np.eye(5) + slopes @ prior @ slopes.T
+    assert squares == pytest.approx(data @ np.linalg.solve(joint, data))
+    assert logs == pytest.approx(-0.5 * (squares + np.linalg.slogdet(joint)[1]))
 
 
 def test_a_blind_file_is_sent_to_an_angle_that_sees(blind: Fit, for_eta: Design) -> None:

@@ -74,7 +74,7 @@ class Page(html.parser.HTMLParser):
 
 
 def test_page_is_well_formed_and_says_what_was_found(page, studied):
-    posteriors, match = studied
+    posteriors, match = studied.posteriors, studied.match
     read = Page(page)
     assert read.open == []
     assert match is not None
@@ -92,9 +92,9 @@ def test_page_is_well_formed_and_says_what_was_found(page, studied):
 
 
 def test_pictures_are_embedded_and_whole(page):
-    """Curves and residuals of the channels, albedo, two corner plots."""
+    """Curves and residuals of the channels; albedo, distances, causes, noise and spheres; choice; two corner plots."""
     links = Page(page).links
-    assert len(links) == 3 + 1 + 1 + 2
+    assert len(links) == 3 + 1 + 5 + 2 + 2
     for link in links:
         kind, _, data = link.partition(",")
         assert kind == "data:image/png;base64"

@@ -72,3 +72,16 @@ def test_many_readings_are_thinned_and_many_incidences_grouped(fit: Fit) -> None
     assert found.every.value == pytest.approx(0.5 * np.sqrt(9000), rel=1e-9)
     assert len(found.theta_i_deg) <= 19
     assert found.readings.sum() == pytest.approx(9000, abs=10)
+
+
+def test_what_is_masked_in_one_channel_does_not_count(fit: Fit) -> None:
+    """Two channels of 90 readings, z = 0.5; three readings of the second are masked."""
+    m, valid = fit.measurements, np.ones((90, 2), bool)
+    valid[:3, 1] = False
+    both = dataclasses.replace(m, value=np.full((90, 2), 0.1), sigma=None, valid=valid, channels=("a", "b"))
+    noise = dataclasses.replace(fit.noise, sigma=np.full((90, 2), SIGMA))
+    coloured = dataclasses.replace(fit, measurements=both, noise=noise, model=fm.model("lambert", channels=2, kd=0.3))
+    values = tuple(np.full((3, 2), f * np.pi) for f in (0.105, 0.1))
+    found = tell_apart(coloured, coloured, (values[0], values[1]))
+    assert list(found.readings) == [57, 120]
+    assert found.every.value == pytest.approx(0.5 * np.sqrt(177))
