@@ -1,6 +1,8 @@
 from .approximation import laplace as laplace
 from .brdf import evaluate as evaluate
 from .brdf import model as model
+from .calibration import Calibration as Calibration
+from .calibration import calibrate as calibrate
 from .candidates import Limits as Limits
 from .choice import Choice as Choice
 from .choice import choose as choose

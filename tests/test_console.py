@@ -19,9 +19,7 @@ def posterior() -> Posterior:
     truth = fitmat.model("lambert+ggx", channels=3, kd=np.array([0.4, 0.1, 0.2]), alpha=0.3)
     angles = np.deg2rad([20, 45, 70]), np.deg2rad(np.arange(-80, 81, 10))
     made = simulate(truth, *angles, relative_noise=0.02, absolute_noise=1e-3, seed=1)
-    found = console.study(made, console.Plan({"lambert+ggx": {}}, sampling=False))
-    assert found.match is None
-    return found.posteriors[0]
+    return console.fitted(made, console.Plan({"lambert+ggx": {}}))[0]
 
 
 @pytest.fixture(autouse=True)
@@ -71,10 +69,8 @@ def test_options_go_to_the_models_that_have_them(posterior):
     fixed = {"exponent": np.array([20.0]), "kd": np.array([0.3])}
     names = ["lambert+phong", "lambert+ggx"]
     measurements = posterior.fit.measurements
-    plan = console.Plan({name: {} for name in names}, fixed, masking="separable", sampling=False)
-    found = console.study(measurements, plan)
-    assert [sorted(p.fit.held) for p in found.posteriors] == [["exponent", "kd"], ["kd"]]
-    assert found.match is not None
+    plan = console.Plan({name: {} for name in names}, fixed, masking="separable")
+    assert [sorted(p.fit.held) for p in console.fitted(measurements, plan)] == [["exponent", "kd"], ["kd"]]
 
 
 @pytest.mark.parametrize(
@@ -101,6 +97,7 @@ def test_handler_is_restored_after_sampling(posterior, monkeypatch):
         return posterior
 
     monkeypatch.setattr(console, "sample", sample)
+    monkeypatch.setattr(console, "concluded", lambda found, match, **_: Study(tuple(found), match))
     console.study(posterior.fit.measurements, console.Plan({"lambert+ggx": {}}))
     assert seen[0] is not before
     assert signal.getsignal(signal.SIGINT) is before

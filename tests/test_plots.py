@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 import fitmat
 from fitmat import console, plots, prediction
-from fitmat.comparison import Comparison
+from fitmat.comparison import Comparison, compare
 from fitmat.posterior import Posterior
 from fitmat.synthetic import simulate
 
@@ -27,9 +27,8 @@ def studied() -> tuple[list[Posterior], Comparison]:
     valid = made.valid.copy()
     valid[0, 1] = False
     made = dataclasses.replace(made, valid=valid)
-    found = console.study(made, console.Plan({name: {} for name in NAMES}, sampling=False))
-    assert found.match is not None
-    return list(found.posteriors), found.match
+    posteriors = console.fitted(made, console.Plan({name: {} for name in NAMES}))
+    return posteriors, compare(*posteriors, spheres=False)
 
 
 def labelled(ax: Axes) -> dict[str, np.ndarray]:

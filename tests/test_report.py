@@ -103,7 +103,7 @@ def test_pictures_are_embedded_and_whole(page):
         assert image.startswith(b"\x89PNG\r\n\x1a\n")
         assert image.endswith(b"IEND\xaeB`\x82")
         assert 200 < width < 2000
-        assert 200 < height < 2000
+        assert 100 < height < 2000
 
 
 def test_nothing_is_fetched(page):
