@@ -77,7 +77,7 @@ def doubted(fit: Fit) -> Doubts:
     elif not fit.noise.known:
         words.append(f"Whether {fit.name} is adequate cannot be judged: the noise is not known.")
     inadequate = bool(missed or noise or identical or (clashes and not fit.loss.robust))
-    if inadequate:
+    if inadequate and fit.loss.posterior:
         words.append("The intervals hold only if the model and the noise are right, which these data contradict.")
     return Doubts(tuple(words), inadequate)
 

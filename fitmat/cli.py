@@ -99,7 +99,8 @@ def fit(
         )
         found = console.study(measurements, plan)
         report.write(draft, found)
-    folder.discard(folder.resumed(target))
+    if not no_mcmc:
+        folder.discard(folder.resumed(target))
     if json_:
         sys.stdout.write((target / "fit.json").read_text(encoding="utf-8"))
     else:

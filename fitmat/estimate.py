@@ -21,6 +21,11 @@ class Estimate:
     value: float
     ci95: tuple[float, float]
 
+    @property
+    def has_interval(self) -> bool:
+        """Whether draws spread about it; those of an objective do not."""
+        return self.ci95[0] < self.ci95[1]
+
 
 def estimate(values: Float[np.ndarray, " d"]) -> Estimate:
     """The first entry with the 2.5 % and 97.5 % quantiles of the others; without others, the entry alone.

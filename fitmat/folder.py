@@ -8,10 +8,17 @@ import itertools
 import os
 import shutil
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 from fitmat.errors import OutputError
+
+DRAFT = ".fitmat-"
+"""How the names of unfinished folders begin."""
+
+ABANDONED = 7 * 24 * 3600.0
+"""Seconds after which an unfinished folder is nobody's any more."""
 
 
 def default(source: Path) -> Path:
@@ -24,7 +31,8 @@ def default(source: Path) -> Path:
 
 def resumed(target: Path) -> Path:
     """Where a run keeps what it would need to go on, `NAME-fitmat.resume` beside its results."""
-    return target.with_name(f"{target.name}.resume")
+    place = target.absolute()
+    return place.parent / f"{place.name}.resume"
 
 
 def discard(folder: Path) -> None:
@@ -48,7 +56,8 @@ def new(target: Path, *, force: bool = False, stale: str = "") -> Iterator[Path]
         if target.exists() and (not target.is_dir() or any(target.iterdir())) and not force:
             raise OutputError(f"{target} already exists; give another --out DIR, or --force to replace the run in it.")
         place = next(p for p in (target, *target.absolute().parents) if p.exists())
-        draft = Path(tempfile.mkdtemp(prefix=".fitmat-", dir=place))
+        _sweep(place)
+        draft = Path(tempfile.mkdtemp(prefix=DRAFT, dir=place))
     except OSError as error:
         raise OutputError(f"cannot write {target}: {_reason(error)}; choose another place with --out.") from error
     try:
@@ -58,6 +67,14 @@ def new(target: Path, *, force: bool = False, stale: str = "") -> Iterator[Path]
         raise OutputError(f"cannot write {target}: {_reason(error)}; the report is not there.") from error
     finally:
         shutil.rmtree(draft, ignore_errors=True)
+
+
+def _sweep(place: Path) -> None:
+    """Remove the drafts that killed runs left, once they are older than any run."""
+    for left in place.glob(f"{DRAFT}*"):
+        with contextlib.suppress(OSError):
+            if time.time() - left.stat().st_mtime > ABANDONED:
+                shutil.rmtree(left, ignore_errors=True)
 
 
 def _move(draft: Path, target: Path, stale: str) -> None:

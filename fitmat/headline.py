@@ -3,6 +3,8 @@
 It measures nothing and decides nothing that a named threshold does not.
 """
 
+import math
+
 from fitmat.ablation import TERMS, Ablation
 from fitmat.estimate import Estimate
 from fitmat.regions import GRAZING_DEG
@@ -25,11 +27,9 @@ def distance_sentence(names: Names, distance: Estimate) -> str:
     """How far apart the two are over the hemisphere."""
     highest = distance.ci95[1]
     words = "hardly differ" if highest < CLOSE else "differ moderately" if highest < SIMILAR else "differ strongly"
+    apart = f"{names[0]} and {names[1]} {words}: {100 * distance.value:.0f} % apart over the hemisphere"
     low, high = (100 * x for x in distance.ci95)
-    return (
-        f"{names[0]} and {names[1]} {words}: {100 * distance.value:.0f} % apart over the hemisphere "
-        f"(95 % interval {low:.0f}–{high:.0f} %)."
-    )
+    return f"{apart} (95 % interval {low:.0f}–{high:.0f} %)." if distance.has_interval else f"{apart}."
 
 
 def telling_sentence(names: Names, telling: Telling) -> str | None:
@@ -62,8 +62,9 @@ def grazing_sentence(names: Names, excess: Estimate, ablation: Ablation | None) 
     causes = ablation.causes(ablation.grazing) if ablation is not None else ()
     why = f": it has {' and '.join(TERMS[cause] for cause in causes)}" if causes else ""
     return (
-        f"Beyond {GRAZING_DEG:.0f}° {names[0]} reflects {abs(100 * excess.value):.0f} % {side} than {names[1]} "
-        f"({low:.0f}–{high:.0f} %){why}."
+        f"Beyond {GRAZING_DEG:.0f}° {names[0]} reflects {abs(100 * excess.value):.0f} % {side} than {names[1]}"
+        + (f" ({low:.0f}–{high:.0f} %)" if excess.has_interval else "")
+        + f"{why}."
     )
 
 
@@ -72,12 +73,15 @@ def gap_sentence(names: Names, gap: Estimate, sign: int, theta_i_deg: float) -> 
     side = "less" if sign < 0 else "more"
     return (
         f"At {theta_i_deg:.0f}° incidence {names[0]} reflects {100 * gap.value:.1f} % of the light "
-        f"{side} than {names[1]} ({100 * gap.ci95[0]:.1f}–{100 * gap.ci95[1]:.1f} %)."
+        f"{side} than {names[1]}"
+        + (f" ({100 * gap.ci95[0]:.1f}–{100 * gap.ci95[1]:.1f} %)." if gap.has_interval else ".")
     )
 
 
 def evidence_sentence(names: Names, delta_bic: float) -> str:
-    """Which of the two the data prefer."""
+    """Which of the two the data prefer; nothing where the loss is an objective, which weighs no models."""
+    if math.isnan(delta_bic):
+        return ""
     if abs(delta_bic) < STRONG_EVIDENCE:
         return f"The data do not decide between them (ΔBIC {delta_bic:.0f})."
     return f"The data clearly prefer {names[1] if delta_bic > 0 else names[0]} (ΔBIC {abs(delta_bic):.0f})."

@@ -117,7 +117,7 @@ def _quantity_dict(q: Quantity, channels: int) -> dict[str, Any]:
 
 def _match_dict(match: Comparison) -> dict[str, Any]:
     def estimate(e: Estimate | None) -> dict[str, Any] | None:
-        return None if e is None else {"value": e.value, "ci95": list(e.ci95)}
+        return None if e is None else {"value": e.value, "ci95": list(e.ci95) if e.has_interval else None}
 
     return {
         "empirical": match.empirical.fit.name,

@@ -7,6 +7,7 @@ import dataclasses
 
 import numpy as np
 
+from fitmat.conversion import alpha_from_exponent, exponent_from_alpha
 from fitmat.fresnel import eta_from_f0, f0_from_eta
 from fitmat.params import space
 from fitmat.posterior import Posterior
@@ -42,7 +43,7 @@ class Quantity:
 
 
 def parameters(posterior: Posterior) -> list[Quantity]:
-    """The model's parameters, then the discrepancy s.
+    """The model's parameters, then the discrepancy s where the loss infers it; an objective gives values only.
 
     Value: the best fit. Intervals: quantiles of the draws where these follow the posterior itself; otherwise Laplace,
     computed in the logarithm for parameters whose scale is log.
@@ -50,6 +51,8 @@ def parameters(posterior: Posterior) -> list[Quantity]:
     fit = posterior.fit
     sampled = posterior.exact
     sd = posterior.sd() if sampled else np.sqrt(np.diagonal(fit.covariance))
+    if not fit.loss.posterior:
+        sd = np.full_like(sd, np.nan)
     ci95 = posterior.interval() if sampled else _laplace_interval(posterior, sd)
     bound = space(fit.model).at_bound(fit.values)
     result = []
@@ -69,7 +72,7 @@ def parameters(posterior: Posterior) -> list[Quantity]:
                 remark=remark,
             )
         )
-    return [*result, _discrepancy(posterior)]
+    return [*result, _discrepancy(posterior)] if fit.loss.infers_discrepancy else result
 
 
 def _discrepancy(posterior: Posterior) -> Quantity:
@@ -120,10 +123,12 @@ def derived(posterior: Posterior) -> list[Quantity]:
         found.append(("eta", "η", "index of the dielectric with that F0", index, "f0"))
     if "alpha" in names:
         alpha = of("alpha")
-        found.append(("exponent", "n", "exponent of the Blinn lobe as wide, 2/α² − 2", 2 / alpha**2 - 2, "alpha"))
+        found.append(
+            ("exponent", "n", "exponent of the Blinn lobe as wide, 2/α² − 2", exponent_from_alpha(alpha), "alpha")
+        )
         found.append(("roughness", "√α", "artists' roughness", np.sqrt(alpha), "alpha"))
     if "exponent" in names:
-        width = np.sqrt(2 / (of("exponent") + 2))
+        width = alpha_from_exponent(of("exponent"))
         found.append(("alpha", "α", "slope of the microfacet lobe as wide, √(2/(n+2))", width, "exponent"))
     return [_from_draws(item, posterior) for item in found]
 
@@ -132,5 +137,7 @@ def _from_draws(item: tuple[str, str, str, np.ndarray, str], posterior: Posterio
     name, symbol, doc, draws, source = item
     origin = next(q for q in parameters(posterior) if q.name == source)
     ci95 = np.quantile(draws[1:], [0.025, 0.975], axis=0).T
+    if not posterior.fit.loss.posterior:
+        ci95 = np.full_like(ci95, np.nan)
     sd = np.where(np.isfinite(origin.sd), draws[1:].std(axis=0), np.nan)
     return Quantity(name, symbol, "1", doc, draws[0], sd, ci95, origin.per_channel, origin.remark)
