@@ -225,7 +225,7 @@ Replace = Annotated[bool, typer.Option("--force", help="Replace the file where i
 Loss = Annotated[
     str,
     typer.Option(
-        help="What the fit minimises, see [bold]fitmat losses[/bold]: default, gaussian, student-t, mixture, log10, …",
+        help="What the fit minimises, see [bold]fitmat losses[/bold]: default, gaussian, student-t, mixture, log10 and others",
         metavar="NAME",
     ),
 ]

@@ -63,7 +63,10 @@ class Ridge:
         which = rng.choice(len(self.weight), count, p=self.weight)
         at = self.centre[:, self.place]
         held = at[which] + np.sqrt(12.0) * self.along[which, self.place] * (rng.random(count) - 0.5)
-        curve = PchipInterpolator(at, self.centre)(np.clip(held, at[0], at[-1]))
+        apart = np.r_[True, np.diff(at) > 0]
+        curve = self.centre[which]
+        if np.count_nonzero(apart) > 1:
+            curve = PchipInterpolator(at[apart], self.centre[apart])(np.clip(held, at[0], at[-1]))
         values, vectors = np.linalg.eigh(self.across)
         roots = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
         natural = curve + np.einsum("mij,mj->mi", roots[which], rng.normal(size=(count, len(free))))

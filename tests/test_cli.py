@@ -65,7 +65,14 @@ def curves(value: Callable[[int, int], float] = lambda i, o: 0.1 + 0.001 * o, th
     return HEAD + "".join(f"{i},{o},{value(i, o):.6g}\n" for i in (10, 30, 60) for o in theta_o)
 
 
+def with_sigma(sigma: Callable[[int], float]) -> str:
+    """A table of three in-plane curves with σ as a function of theta_o."""
+    rows = [f"{i},{o},{0.1 + 0.001 * o:.6g},{sigma(o):g}" for i in (10, 30, 60) for o in range(-80, 81, 10)]
+    return HEAD.rstrip("\n") + ",sigma\n" + "\n".join(rows) + "\n"
+
+
 BAD: dict[str, tuple[str | bytes, str]] = {
+    "sigma 0": (with_sigma(lambda o: 0), r"every row is masked \(51 sigma missing, infinite or not positive\)"),
     "0 bytes": (b"", r"bad\.csv: the file is empty \(0 bytes\)"),
     "header only": (HEAD, r"bad\.csv: a header and no rows"),
     "one row": (HEAD + "30,30,0.5\n", r"1 valid samples, but lambert has 1 free parameters and needs at least 3"),
@@ -115,6 +122,12 @@ BAD_ARGUMENTS: dict[str, tuple[tuple[str, ...], str]] = {
     "out below a file": (("fit", "sparse.csv", "--out", "sparse.csv/x"), "cannot write .*: Not a directory; choose"),
     "out not writable": (("fit", "sparse.csv", "--out", "/proc/x"), "cannot write /proc/x: .*; choose another place"),
     "name too long": (("fit", "sparse.csv", "--out", "a" * 300), "File name too long; choose another place"),
+    "unknown loss": (("fit", "sparse.csv", *QUICK, "--loss", "lg"), "unknown loss 'lg': choose from default, gaussian"),
+    "half a prior": (("fit", "sparse.csv", *QUICK, "--prior", "kd=0.3"), "--prior 'kd=0.3': expected NAME=CENTRE,SD"),
+    "prior of nothing": (
+        ("fit", "sparse.csv", *QUICK, "--prior", "eta=2,1"),
+        "--prior eta: no model of lambert has it",
+    ),
     "no manual": (("models", "foo"), "no lobe 'foo'; try "),
     "simulate nothing": (("simulate",), r"name a model to simulate, for example lambert\+ggx"),
     "simulate unknown": (("simulate", "lambert", "--set", "x=1"), "has no parameter 'x'; it has kd"),
@@ -185,6 +198,8 @@ def test_odd_rows_are_kept_or_masked_and_counted(run, tmp_path):
 
 
 LABELLED: dict[str, tuple[str, tuple[str, ...], str]] = {
+    "sigma negative": (with_sigma(lambda o: 0.002 * np.sign(o + 75)), ("converged",), "3 masked: sigma missing, infin"),
+    "inadequate": (with_sigma(lambda o: 0.002), ("converged",), "inadequate: lambert is inadequate: it misses the dat"),
     "all zero": (curves(lambda i, o: 0), ("at_bound",), "Noise unknown"),
     "all negative": (curves(lambda i, o: -1 - 0.01 * (o % 3)), ("at_bound", "unidentifiable"), "kept as noise: 51"),
     "rows copied": (curves() + curves()[len(HEAD) :], ("converged",), "or exact copies"),
@@ -338,12 +353,18 @@ def test_models_are_listed_and_explained(run):
     assert max(map(len, page.splitlines())) <= 80
 
 
-@pytest.mark.parametrize("command", [(), ("fit",), ("simulate",), ("models",)], ids=" ".join)
+def test_losses_are_listed(run):
+    listed = " ".join(run("losses").out.split())
+    assert all(word in listed for word in ("student-t", "low-e2", "Lange, Little", "posterior", "--loss NAME"))
+
+
+@pytest.mark.parametrize("command", [(), ("fit",), ("simulate",), ("models",), ("design",)], ids=" ".join)
 def test_help_is_complete_at_80_columns(run, command):
     ended = run(*command, "--help")
     assert ended.code == 0
     assert "…│" not in ended.out.replace(" ", "")  # no option is cut off
     words = {"fit": ("Examples", "report.html", "brdf_550"), "simulate": ("Example", "--set"), "models": ("manual",)}
+    words["design"] = ("--for match", "Examples")
     for word in words.get("".join(command), ("Exit codes", "0 all fits converged", "Examples")):
         assert word in " ".join(ended.out.split())
 
