@@ -2,26 +2,20 @@
 
 import atexit
 import gc
-import io
-import logging
 import os
-import shutil
-import signal
 import sys
 import warnings
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 import typer
 
-from fitmat import flags, options
+from fitmat import flags, options, process
 from fitmat.errors import FitmatError
 
 DEFAULT_MODELS = "lambert+blinn-phong,lambert+ggx"
 WRONG_INPUT = 1
 NOT_CONVERGED = 3
-INTERRUPTED = 130
 
 app = typer.Typer(
     add_completion=False,
@@ -54,7 +48,8 @@ def _setup() -> None:
     "degrees; brdf, brdf_cos, reflectance_factor, radiance, or signal and reference; brdf_r, brdf_g, brdf_b or "
     "brdf_550 for channels; sigma where the noise is known.\n\n"
     "Written to --out: report.html (tables and pictures), fit.json (the same numbers), posterior-MODEL.nc (draws of "
-    "the parameters, for ArviZ). Ctrl-C during sampling keeps what is done and still writes them.\n\n"
+    "the parameters, for ArviZ). Ctrl-C during sampling keeps what is done and still writes them; a killed run goes on "
+    "when it is given again.\n\n"
     "Examples:\n\n"
     "  fitmat fit measurements.csv\n\n"
     "  fitmat fit measurements.csv --models lambert+ggx --fix ks=1 --out run1\n\n"
@@ -93,7 +88,7 @@ def fit(
     known = conditions.prepared(console.model_names(models, shown), shown, ior=ior, tilt=tilt)
     target = out or folder.default(file)
     with folder.new(target, force=force, stale=report.POSTERIOR.format("*")) as draft:
-        _leave_on_interrupt(draft)
+        process.leave_on_interrupt(draft)
         plan = console.Plan(
             known, fixed, believed, loss, masking, not no_mcmc, seed, check_posterior, folder.resumed(target)
         )
@@ -256,8 +251,8 @@ def losses() -> None:
 
 def main() -> None:
     """Run the command line; wrong input, a full disk and Ctrl-C become one line on stderr and an exit code."""
-    _prepare_streams()
-    _leave_on_interrupt()
+    process.prepare_streams()
+    process.leave_on_interrupt()
     # A run is short and makes few reference cycles; looking for them, at the end above all, takes a fifth of its time.
     gc.disable()
     atexit.register(gc.freeze)
@@ -273,32 +268,6 @@ def main() -> None:
         # What could not be written must not be tried again when Python closes stdout.
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         _end(f"cannot write the output: {error.strerror or error}.")
-
-
-def _prepare_streams() -> None:
-    """Keep stderr for what the user must act on, and never fail on a character that the terminal lacks."""
-    if not sys.warnoptions:
-        warnings.simplefilter("ignore")
-    logging.disable(logging.WARNING)
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
-
-
-def _leave_on_interrupt(draft: Path | None = None) -> None:
-    """Let Ctrl-C end the program at once, and its draft with it.
-
-    No exception: raised inside compiled code or while a module loads, it gets lost, turns into another, or crashes.
-    """
-
-    def leave(number: int, frame: FrameType | None) -> None:
-        if draft is not None:
-            shutil.rmtree(draft, ignore_errors=True)
-        sys.stderr.write("fitmat: interrupted before the end; no report was written.\n")
-        sys.stderr.flush()
-        os._exit(INTERRUPTED)
-
-    signal.signal(signal.SIGINT, leave)
 
 
 def _end(message: str) -> None:

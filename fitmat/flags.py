@@ -7,33 +7,179 @@ import functools
 import inspect
 from collections.abc import Callable
 from math import radians
-from typing import Any
+from typing import Annotated, Any
 
-from fitmat import options
+import typer
+
 from fitmat.errors import ReadError
+
+FILE = "What the file does not say"
+INSTRUMENT = "The instrument"
+
+Columns = Annotated[
+    str | None,
+    typer.Option(
+        help="Which column is what, where the header has other names: theta_i=Zenith,brdf=3 (a name in the "
+        "header, or a column number from 1).",
+        metavar="OURS=THEIRS",
+        show_default=False,
+        rich_help_panel=FILE,
+    ),
+]
+
+Quantity = Annotated[
+    str | None,
+    typer.Option(
+        help="What a column called 'value' holds: brdf (sr⁻¹), brdf_cos, reflectance_factor, radiance, panel_ratio.",
+        metavar="KIND",
+        show_default=False,
+        rich_help_panel=FILE,
+    ),
+]
+
+AngleUnit = Annotated[
+    str | None,
+    typer.Option(
+        help="Unit of the angles: degrees (default) or radians.",
+        metavar="UNIT",
+        show_default=False,
+        rich_help_panel=FILE,
+    ),
+]
+
+Forward = Annotated[
+    str,
+    typer.Option(
+        help="Sign of theta_o on the mirror side, in files without azimuth: positive or negative.",
+        metavar="SIGN",
+        rich_help_panel=FILE,
+    ),
+]
+
+SpecularAzimuth = Annotated[
+    int,
+    typer.Option(
+        help="Relative azimuth phi of the mirror side in the file: 180 or 0.", metavar="PHI", rich_help_panel=FILE
+    ),
+]
+
+Intensity = Annotated[
+    float | None,
+    typer.Option(
+        help="Of the source, in W/sr, where the file holds radiances.",
+        metavar="X",
+        show_default=False,
+        rich_help_panel=FILE,
+    ),
+]
+
+Distance = Annotated[
+    float | None,
+    typer.Option(
+        help="Of the source from the sample, in m, with --intensity.",
+        metavar="X",
+        show_default=False,
+        rich_help_panel=FILE,
+    ),
+]
+
+Where = Annotated[
+    str | None,
+    typer.Option(
+        help="Read only the rows in which a column has this value: material=Alu.",
+        metavar="NAME=VALUE",
+        show_default=False,
+        rich_help_panel=FILE,
+    ),
+]
+
+Panel = Annotated[
+    float | None,
+    typer.Option(
+        help="Reflectance factor of the white panel, where the file holds signal and reference, or their ratio.",
+        metavar="R",
+        show_default=False,
+        rich_help_panel=FILE,
+    ),
+]
+
+UnknownScale = Annotated[
+    bool,
+    typer.Option(
+        "--unknown-scale",
+        help="The values are right but for one common factor: fit it.",
+        rich_help_panel=INSTRUMENT,
+    ),
+]
+
+Calibration = Annotated[
+    float,
+    typer.Option(
+        min=0,
+        max=1,
+        help="Relative standard deviation of a scale error that all values share, such as 0.03.",
+        metavar="X",
+        show_default=False,
+        rich_help_panel=INSTRUMENT,
+    ),
+]
+
+SourceAngle = Annotated[
+    float,
+    typer.Option(
+        min=0,
+        max=30,
+        help="Half-angle of the cone in which light reaches the sample, in degrees.",
+        metavar="DEG",
+        show_default=False,
+        rich_help_panel=INSTRUMENT,
+    ),
+]
+
+ReceiverAngle = Annotated[
+    float,
+    typer.Option(
+        min=0,
+        max=30,
+        help="Half-angle of the cone that the detector collects, in degrees.",
+        metavar="DEG",
+        show_default=False,
+        rich_help_panel=INSTRUMENT,
+    ),
+]
+
+Dark = Annotated[
+    str,
+    typer.Option(
+        help="Dark signal and stray light as BRDF times cosθ_o, in sr⁻¹, or 'fit'.",
+        metavar="X",
+        show_default=False,
+        rich_help_panel=INSTRUMENT,
+    ),
+]
 
 
 def reading(
-    columns: options.Columns = None,
-    quantity: options.Quantity = None,
-    angle_unit: options.AngleUnit = None,
-    forward: options.Forward = "positive",
-    specular_azimuth: options.SpecularAzimuth = 180,
-    intensity: options.Intensity = None,
-    distance: options.Distance = None,
-    where: options.Where = None,
-    panel: options.Panel = None,
-    unknown_scale: options.UnknownScale = False,
+    columns: Columns = None,
+    quantity: Quantity = None,
+    angle_unit: AngleUnit = None,
+    forward: Forward = "positive",
+    specular_azimuth: SpecularAzimuth = 180,
+    intensity: Intensity = None,
+    distance: Distance = None,
+    where: Where = None,
+    panel: Panel = None,
+    unknown_scale: UnknownScale = False,
 ) -> dict[str, Any]:
     """What the flags say of a file, as arguments of `fitmat.read`."""
     return dict(locals())
 
 
 def instrument(
-    calibration: options.Calibration = 0.0,
-    source_angle: options.SourceAngle = 0.0,
-    receiver_angle: options.ReceiverAngle = 0.0,
-    dark: options.Dark = "0",
+    calibration: Calibration = 0.0,
+    source_angle: SourceAngle = 0.0,
+    receiver_angle: ReceiverAngle = 0.0,
+    dark: Dark = "0",
 ) -> Any:
     """The `fitmat.instrument.Instrument` that the flags describe.
 

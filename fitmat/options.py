@@ -8,9 +8,6 @@ from typing import Annotated, Literal
 
 import typer
 
-FILE = "What the file does not say"
-INSTRUMENT = "The instrument"
-
 File = Annotated[
     Path,
     typer.Argument(
@@ -61,148 +58,6 @@ Masking = Annotated[
     ),
 ]
 
-Columns = Annotated[
-    str | None,
-    typer.Option(
-        help="Which column is what, where the header has other names: theta_i=Zenith,brdf=3 (a name in the "
-        "header, or a column number from 1).",
-        metavar="OURS=THEIRS",
-        show_default=False,
-        rich_help_panel=FILE,
-    ),
-]
-
-Quantity = Annotated[
-    str | None,
-    typer.Option(
-        help="What a column called 'value' holds: brdf (sr⁻¹), brdf_cos, reflectance_factor, radiance, panel_ratio.",
-        metavar="KIND",
-        show_default=False,
-        rich_help_panel=FILE,
-    ),
-]
-
-AngleUnit = Annotated[
-    str | None,
-    typer.Option(
-        help="Unit of the angles: degrees (default) or radians.",
-        metavar="UNIT",
-        show_default=False,
-        rich_help_panel=FILE,
-    ),
-]
-
-Forward = Annotated[
-    str,
-    typer.Option(
-        help="Sign of theta_o on the mirror side, in files without azimuth: positive or negative.",
-        metavar="SIGN",
-        rich_help_panel=FILE,
-    ),
-]
-
-SpecularAzimuth = Annotated[
-    int,
-    typer.Option(
-        help="Relative azimuth phi of the mirror side in the file: 180 or 0.", metavar="PHI", rich_help_panel=FILE
-    ),
-]
-
-Intensity = Annotated[
-    float | None,
-    typer.Option(
-        help="Of the source, in W/sr, where the file holds radiances.",
-        metavar="X",
-        show_default=False,
-        rich_help_panel=FILE,
-    ),
-]
-
-Distance = Annotated[
-    float | None,
-    typer.Option(
-        help="Of the source from the sample, in m, with --intensity.",
-        metavar="X",
-        show_default=False,
-        rich_help_panel=FILE,
-    ),
-]
-
-Where = Annotated[
-    str | None,
-    typer.Option(
-        help="Read only the rows in which a column has this value: material=Alu.",
-        metavar="NAME=VALUE",
-        show_default=False,
-        rich_help_panel=FILE,
-    ),
-]
-
-Panel = Annotated[
-    float | None,
-    typer.Option(
-        help="Reflectance factor of the white panel, where the file holds signal and reference, or their ratio.",
-        metavar="R",
-        show_default=False,
-        rich_help_panel=FILE,
-    ),
-]
-
-UnknownScale = Annotated[
-    bool,
-    typer.Option(
-        "--unknown-scale",
-        help="The values are right but for one common factor: fit it.",
-        rich_help_panel=INSTRUMENT,
-    ),
-]
-
-Calibration = Annotated[
-    float,
-    typer.Option(
-        min=0,
-        max=1,
-        help="Relative standard deviation of a scale error that all values share, such as 0.03.",
-        metavar="X",
-        show_default=False,
-        rich_help_panel=INSTRUMENT,
-    ),
-]
-
-SourceAngle = Annotated[
-    float,
-    typer.Option(
-        min=0,
-        max=30,
-        help="Half-angle of the cone in which light reaches the sample, in degrees.",
-        metavar="DEG",
-        show_default=False,
-        rich_help_panel=INSTRUMENT,
-    ),
-]
-
-ReceiverAngle = Annotated[
-    float,
-    typer.Option(
-        min=0,
-        max=30,
-        help="Half-angle of the cone that the detector collects, in degrees.",
-        metavar="DEG",
-        show_default=False,
-        rich_help_panel=INSTRUMENT,
-    ),
-]
-
-Dark = Annotated[
-    str,
-    typer.Option(
-        help="Dark signal and stray light as BRDF times cosθ_o, in sr⁻¹, or 'fit'.",
-        metavar="X",
-        show_default=False,
-        rich_help_panel=INSTRUMENT,
-    ),
-]
-
 Plot = Annotated[
     Path | None,
     typer.Option(help="Draw what was measured where into this PNG, SVG or PDF.", metavar="FILE", show_default=False),
@@ -225,7 +80,8 @@ Replace = Annotated[bool, typer.Option("--force", help="Replace the file where i
 Loss = Annotated[
     str,
     typer.Option(
-        help="What the fit minimises, see [bold]fitmat losses[/bold]: default, gaussian, student-t, mixture, log10 and others",
+        help="What the fit minimises, see [bold]fitmat losses[/bold]: default, gaussian, student-t, mixture, log10 "
+        "and others",
         metavar="NAME",
     ),
 ]

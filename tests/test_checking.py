@@ -304,8 +304,9 @@ def test_calibration_and_dark_signal_are_fitted_and_reported(run: Run, tmp_path:
     ended = run("fit", path, "--models", "lambert", "--no-mcmc", "--json", "--calibration", 0.03, "--dark", "fit")
     assert ended.code == 0
     found = strict(ended.out)["fits"][0]["parameters"]
-    # 51 samples of 0.1 % know kd g to 0.03 %, so that the 3 % of g remain.
-    assert found["kd"]["sd"] == pytest.approx(0.03 * kd, rel=0.02)
-    assert found["scale"]["sd"] == pytest.approx(0.03, rel=0.02)
+    # 51 samples of 0.1 % know kd g to 0.03 %, so that the 3 % of g remain; the sd of 2,000 weighted draws, some 1,000
+    # independent ones, has an error of 2.2 %, here three times that.
+    assert found["kd"]["sd"] == pytest.approx(0.03 * kd, rel=0.066)
+    assert found["scale"]["sd"] == pytest.approx(0.03, rel=0.066)
     assert found["kd"]["value"] == pytest.approx(kd, rel=2e-3)
     assert found["dark"]["value"] == pytest.approx(dark, rel=1e-2)

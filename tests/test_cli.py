@@ -292,12 +292,12 @@ def test_same_seed_same_numbers(run, tmp_path):
 def test_interrupted_sampling_keeps_what_is_done(run, tmp_path, monkeypatch):
     sample = console.sample
 
-    def interrupted(found: Any, *, seed: int, progress: Callable[[int, int], None]) -> Any:
+    def interrupted(found: Any, *, seed: int, progress: Callable[[int, int], None], checkpoint: Path) -> Any:
         def tick(done: int, total: int) -> None:
             signal.raise_signal(signal.SIGINT)
             progress(done, total)
 
-        return sample(found, seed=seed, progress=tick)
+        return sample(found, seed=seed, progress=tick, checkpoint=checkpoint)
 
     monkeypatch.setattr(console, "sample", interrupted)
     ended = run("fit", DATA / "sparse.csv", "--models", "lambert,lambert+phong", "--out", tmp_path / "out")

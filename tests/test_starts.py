@@ -37,6 +37,7 @@ def left(a: np.ndarray, b: np.ndarray, w: np.ndarray) -> float:
 @example(np.eye(8, 3) * [1, 0, 1], np.ones(8))  # a lobe that no sample sees
 @example(-np.eye(8, 3), np.ones(8))  # every weight wants to be negative
 @example(np.zeros((8, 3)), np.ones(8))
+@example(np.eye(8, 3) * 0.0 + np.outer(np.eye(8)[0], [1, -1, 0]) + np.outer(np.eye(8)[1], [0.0625, 0, 0]), np.ones(8))
 def test_weights_are_as_good_as_scipys(a: np.ndarray, b: np.ndarray) -> None:
     w = np.asarray(_solve(a.T @ a, a.T @ b))
     assert (w >= 0).all()

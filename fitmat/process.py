@@ -1,0 +1,43 @@
+"""The process behind a command: its streams, and how Ctrl-C ends it.
+
+It knows no command.
+"""
+
+import io
+import logging
+import os
+import shutil
+import signal
+import sys
+import warnings
+from pathlib import Path
+from types import FrameType
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C."""
+
+
+def prepare_streams() -> None:
+    """Keep stderr for what the user must act on, and never fail on a character that the terminal lacks."""
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")
+    logging.disable(logging.WARNING)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+def leave_on_interrupt(draft: Path | None = None) -> None:
+    """Let Ctrl-C end the program at once, and its draft with it.
+
+    No exception: raised inside compiled code or while a module loads, it gets lost, turns into another, or crashes.
+    """
+
+    def leave(number: int, frame: FrameType | None) -> None:
+        if draft is not None:
+            shutil.rmtree(draft, ignore_errors=True)
+        sys.stderr.write("fitmat: interrupted before the end; no report was written.\n")
+        sys.stderr.flush()
+        os._exit(INTERRUPTED)
+
+    signal.signal(signal.SIGINT, leave)
