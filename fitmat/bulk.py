@@ -15,7 +15,7 @@ from jaxtyping import ArrayLike, Float
 
 from fitmat import fitting
 from fitmat.brdf import AbstractBRDF
-from fitmat.information import FOLLOWS, covariance, expected_information, observed_information
+from fitmat.information import FOLLOWS, covariance, expected_information, is_positive, observed_information
 from fitmat.likelihood import NEGLIGIBLE, Data, noise_scale
 from fitmat.outcome import Fit, named_outcome
 from fitmat.params import space, vector, with_vector
@@ -221,7 +221,7 @@ def _concluded(file: _File, around: _Range, top: _Top) -> Fit:
         at = jnp.asarray(s)
         observed = file.added(lambda data: np.asarray(observed_information(best, data, at)), "curvature")
         observed = observed + np.asarray(prior_sums(best, start.data, at).gram)
-        information = observed if _positive(observed[np.ix_(free, free)]) else information
+        information = observed if is_positive(observed[np.ix_(free, free)]) else information
     spread, undetermined = covariance(best, information, free, start.data.told(free))
     values = np.asarray(vector(best))
     on_bound = bool(space(best).at_bound(values)[free].any())
@@ -245,9 +245,3 @@ def _discrepancy_sd(sums: Sums) -> float:
     """Half of how far s must rise for the log-likelihood to fall by 2, as `approximation` has it, from its parabola."""
     slope, curvature = max(float(sums.slope), 0.0), max(float(sums.curvature), 1e-300)
     return float((np.sqrt(slope**2 + 4.0 * curvature) - slope) / (2.0 * curvature))
-
-
-def _positive(information: np.ndarray) -> bool:
-    scale = np.sqrt(np.abs(np.diagonal(information)) + 1e-300)
-    eigenvalues = np.linalg.eigvalsh(information / np.outer(scale, scale))
-    return bool(np.isfinite(information).all() and eigenvalues.min(initial=1.0) > 1e-9)

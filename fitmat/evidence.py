@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat.brdf import AbstractBRDF
-from fitmat.likelihood import Data, inferred_noise, mapped, residuals
+from fitmat.likelihood import Data, log_pointwise, mapped
 from fitmat.params import with_vector
 from fitmat.posterior import GOOD_PARETO, Posterior
 
@@ -61,14 +61,9 @@ def weigh(posterior: Posterior) -> Evidence | None:
 
 @eqx.filter_jit
 def _pointwise(template: AbstractBRDF, data: Data, values: Array, s: Array) -> Array:
-    """Log density of every value in sr⁻¹ under every draw, (d, n, c); the terms of `likelihood.log_likelihood`."""
-    assert data.loss.spread is not None
-    density = data.loss.spread
+    """Log density of every value in sr⁻¹ under every draw, (d, n, c)."""
 
     def one(draw: tuple[Array, Array]) -> Array:
-        model = with_vector(template, draw[0])
-        noise = inferred_noise(model, data) if data.loss.infers_noise else data.noise
-        logs = jnp.log(density(data.x, noise, data.kappa, draw[1])) - jnp.log(data.kappa) - data.loss.log_peak
-        return -0.5 * residuals(model, data, draw[1]) ** 2 - logs
+        return log_pointwise(with_vector(template, draw[0]), data, draw[1])
 
     return mapped(one, (values, s))  # pyright: ignore[reportArgumentType]

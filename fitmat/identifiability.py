@@ -13,8 +13,9 @@ from fitmat.information import UNDETERMINED
 from fitmat.outcome import Fit
 from fitmat.params import space
 from fitmat.posterior import Posterior
+from fitmat.priors import natural_sd
 from fitmat.profile_likelihood import Profile, profiles
-from fitmat.ridge import Ridge, prior_sd, ridge
+from fitmat.ridge import Ridge, ridge
 from fitmat.trade_offs import Group, groups
 
 DRAWS = 4000
@@ -154,7 +155,7 @@ def identify(posterior: Posterior) -> Identifiability:
     profiled = profiles(fit)
     if not profiled:
         return Identifiability(fit, (), np.zeros(0), ())
-    prior = prior_sd(fit)
+    prior = natural_sd(fit.model, fit.data.prior)[fit.free]
     draws = _draws(posterior, ridge(fit, profiled))
     natural = space(fit.model).natural_array(draws)[:, fit.free]
     contraction = 1.0 - natural.var(axis=0) / prior**2

@@ -58,10 +58,15 @@ def information(best: AbstractBRDF, data: Data, s: float, free: np.ndarray) -> F
     if data.loss.linear and s < FOLLOWS * float(noise_scale(data)):
         return expected
     observed = np.asarray(observed_information(best, data, jnp.asarray(s)))
-    part = observed[np.ix_(free, free)]
-    scale = np.sqrt(np.abs(np.diagonal(part)) + 1e-300)
-    positive = np.isfinite(part).all() and np.linalg.eigvalsh(part / np.outer(scale, scale)).min(initial=1.0) > 1e-9
-    return observed if positive else expected
+    return observed if is_positive(observed[np.ix_(free, free)]) else expected
+
+
+def is_positive(information: np.ndarray) -> bool:
+    """Whether an information matrix is finite and, with a unit diagonal, positive definite beyond rounding."""
+    scale = np.sqrt(np.abs(np.diagonal(information)) + 1e-300)
+    if not np.isfinite(information).all():
+        return False
+    return bool(np.linalg.eigvalsh(information / np.outer(scale, scale)).min(initial=1.0) > 1e-9)
 
 
 def _mean_square(best: AbstractBRDF, data: Data, parameters: int) -> float:

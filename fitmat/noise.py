@@ -65,24 +65,47 @@ def measured_noise(m: Measurements) -> Noise:
     """
     if m.sigma is not None:
         return Noise(np.where(m.valid, m.sigma, 1.0), True, "Measurement noise as given in the file.")
-    sigma, words = np.ones_like(m.value), []
-    for k, channel in enumerate(m.channels):
-        level, error, factor = leave_one_out(m, k)
-        used = np.isfinite(error)
-        smooth = np.where(np.isfinite(level), np.abs(level), np.abs(m.value[:, k]))
-        top = float(np.max(np.abs(m.value[m.valid[:, k], k]), initial=0.0))
-        fewest = max(MIN_RESIDUALS, NEIGHBOURED * np.count_nonzero(m.valid[:, k]))
-        if used.sum() < fewest or np.median(np.abs(error[used])) <= COPIED * top:
-            sigma[:, k] = UNKNOWN_RELATIVE * np.maximum(smooth, UNKNOWN_RELATIVE * max(top, 1e-12))
-            words.append("")
-            continue
-        a, b = components(error[used], smooth[used], factor[used])
-        sigma[:, k] = np.hypot(a, b * smooth)
-        named = f" ({channel})" if len(m.channels) > 1 else ""
-        words.append(f"{100 * b:.2g} % + {a:.2g} sr⁻¹{named}")
-    if not all(words):
-        return Noise(sigma, False, UNKNOWN)
-    return Noise(sigma, True, f"Noise estimated from neighbouring angles: {'; '.join(words)}.")
+    compared = np.stack([np.stack(leave_one_out(m, k)) for k in range(len(m.channels))], axis=2)
+    smooth = np.where(np.isfinite(compared[0]), np.abs(compared[0]), np.abs(m.value))
+    tops = np.max(np.abs(m.value), axis=0, where=m.valid, initial=0.0)
+    counts = np.count_nonzero(m.valid, axis=0)
+    parts = zip(compared[1].T, smooth.T, compared[2].T, tops, counts, strict=True)
+    laws = np.stack([law(error, level, factor, top, int(n)) for error, level, factor, top, n in parts])
+    return Noise(at_level(laws, smooth, tops), bool(np.isfinite(laws).all()), law_words(laws, m.channels))
+
+
+def law(error: np.ndarray, level: np.ndarray, factor: np.ndarray, top: float, count: int) -> Float[np.ndarray, " 2"]:
+    """a and b of one channel from `leave_one_out`; NaN where too few values have neighbours or they are copies.
+
+    Args:
+        error: Of the prediction from neighbours, NaN where there are none, (n,).
+        level: |f| there, (n,).
+        factor: Variance of the error in units of σ², (n,).
+        top: The largest value of the channel.
+        count: How many values there are in all.
+    """
+    used = np.isfinite(error)
+    if used.sum() < max(MIN_RESIDUALS, NEIGHBOURED * count) or np.median(np.abs(error[used])) <= COPIED * top:
+        return np.full(2, np.nan)
+    return np.array(components(error[used], level[used], factor[used]))
+
+
+def at_level(
+    laws: Float[np.ndarray, "c 2"], level: Float[np.ndarray, "n c"], tops: Float[np.ndarray, " c"]
+) -> Float[np.ndarray, "n c"]:
+    """σ of each value by its channel's law; a small placeholder where there is none."""
+    a, b = laws.T
+    little = UNKNOWN_RELATIVE * np.maximum(level, UNKNOWN_RELATIVE * np.maximum(tops, 1e-12))
+    return np.where(np.isfinite(a), np.hypot(np.nan_to_num(a), np.nan_to_num(b) * level), little)
+
+
+def law_words(laws: Float[np.ndarray, "c 2"], channels: tuple[str, ...]) -> str:
+    """The laws of all channels in one sentence."""
+    if not np.isfinite(laws).all():
+        return UNKNOWN
+    named = [f" ({channel})" if len(channels) > 1 else "" for channel in channels]
+    parts = (f"{100 * b:.2g} % + {a:.2g} sr⁻¹{name}" for (a, b), name in zip(laws, named, strict=True))
+    return f"Noise estimated from neighbouring angles: {'; '.join(parts)}."
 
 
 def levels(m: Measurements) -> Float[np.ndarray, "n c"]:

@@ -192,7 +192,7 @@ def plot_choice(choice: Choice, ax: Axes | None = None) -> Axes:
 def plot_left_out(choice: Choice, *, most: int = 4, ax: Axes | None = None) -> Axes:
     """Prediction errors of incidences that were left out, for the `most` best models that were refitted."""
     ax = ax or new_axes()
-    shown = [c for c in choice.candidates if c.left_out is not None][:most]
+    shown = sorted([c for c in choice.candidates if c.left_out is not None][:most], key=lambda c: c.name)
     for c, colour, marker in zip(shown, FIT_COLOURS, "os^D", strict=False):
         assert c.left_out is not None
         ax.plot(c.left_out.theta_i_deg, c.left_out.cube_root, marker, ls="-", color=colour, ms=4, lw=1, label=c.name)

@@ -13,6 +13,7 @@ from scipy.interpolate import PchipInterpolator
 
 from fitmat.outcome import Fit
 from fitmat.params import space
+from fitmat.priors import natural_sd
 from fitmat.profile_likelihood import STEPS, Profile, along
 
 NODES = 4 * STEPS
@@ -76,17 +77,6 @@ class Ridge:
         return full
 
 
-def prior_sd(fit: Fit) -> Float[np.ndarray, " f"]:
-    """Standard deviation of each free parameter's prior, natural: its Gaussian, or 1/√12 of its range."""
-    coordinates, free = space(fit.model), fit.free
-    flat = (coordinates.natural_upper - coordinates.natural_lower)[free] / np.sqrt(12.0)
-    told = fit.data.told(free)
-    if not told.any() or fit.data.prior is None:
-        return flat
-    precision = np.asarray(fit.data.prior.precision)[free]
-    return np.where(told, 1.0 / np.where(told, precision, 1.0), flat)
-
-
 def ridge(fit: Fit, profiled: tuple[Profile, ...]) -> Ridge:
     """The posterior along its least determined parameter, with flat priors where the fit has no others.
 
@@ -98,7 +88,7 @@ def ridge(fit: Fit, profiled: tuple[Profile, ...]) -> Ridge:
         fit: Of at least one free parameter.
         profiled: From `profiles`.
     """
-    prior = prior_sd(fit)
+    prior = natural_sd(fit.model, fit.data.prior)[fit.free]
     filling = np.array([p.sd for p in profiled]) / prior
     place = int(np.argmax(filling))
     held, guess = _spaced(profiled, filling, place, prior)

@@ -35,11 +35,19 @@ class Rows(Protocol):
     """
 
     @property
-    def n_samples(self) -> int: ...  # noqa: D102
+    def n_samples(self) -> int:
+        """See above."""
+        ...
+
     @property
-    def n_valid(self) -> int: ...  # noqa: D102
+    def n_valid(self) -> int:
+        """See above."""
+        ...
+
     @property
-    def part(self) -> Measurements: ...  # noqa: D102
+    def part(self) -> Measurements:
+        """See above."""
+        ...
 
     def __iter__(self) -> Iterator[Measurements]: ...
 

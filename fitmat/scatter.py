@@ -9,17 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.measurement import Measurements
-from fitmat.noise import (
-    COPIED,
-    MIN_RESIDUALS,
-    NEIGHBOURED,
-    UNKNOWN,
-    UNKNOWN_RELATIVE,
-    Noise,
-    components,
-    leave_one_out,
-    measured_noise,
-)
+from fitmat.noise import Noise, at_level, law, law_words, leave_one_out, measured_noise
 from fitmat.rows import Progress, Rows
 
 
@@ -53,10 +43,7 @@ class Scatter:
         return measured_noise(part) if self.given else self._at(_smoothed(part, self.levels))
 
     def _at(self, level: np.ndarray) -> Noise:
-        a, b = self.laws.T
-        little = UNKNOWN_RELATIVE * np.maximum(level, UNKNOWN_RELATIVE * np.maximum(self.tops, 1e-12))
-        sigma = np.where(np.isfinite(a), np.hypot(np.nan_to_num(a), np.nan_to_num(b) * level), little)
-        return Noise(sigma, bool(np.isfinite(a).all()), self.words)
+        return Noise(at_level(self.laws, level, self.tops), bool(np.isfinite(self.laws).all()), self.words)
 
 
 def _smoothed(m: Measurements, level: np.ndarray) -> np.ndarray:
@@ -89,20 +76,5 @@ def scatter(chunks: Rows, progress: Progress | None = None) -> Scatter:
             progress("noise", done, chunks.n_samples)
     levels, errors, factors = np.concatenate(found).transpose(1, 0, 2)
     smooth = _smoothed(part, levels)
-    laws = np.stack([_law(errors[:, k], smooth[:, k], factors[:, k], tops[k]) for k in range(count)])
-    return Scatter(False, laws, tops, levels, _words(laws, part.channels))
-
-
-def _law(error: np.ndarray, smooth: np.ndarray, factor: np.ndarray, top: float) -> Float[np.ndarray, " 2"]:
-    used = np.isfinite(error)
-    if used.sum() < max(MIN_RESIDUALS, NEIGHBOURED * len(error)) or np.median(np.abs(error[used])) <= COPIED * top:
-        return np.full(2, np.nan)
-    return np.array(components(error[used], smooth[used], factor[used]))
-
-
-def _words(laws: np.ndarray, channels: tuple[str, ...]) -> str:
-    if not np.isfinite(laws).all():
-        return UNKNOWN
-    named = [f" ({channel})" if len(channels) > 1 else "" for channel in channels]
-    parts = (f"{100 * b:.2g} % + {a:.2g} sr⁻¹{name}" for (a, b), name in zip(laws, named, strict=True))
-    return f"Noise estimated from neighbouring angles: {'; '.join(parts)}."
+    laws = np.stack([law(errors[:, k], smooth[:, k], factors[:, k], tops[k], len(errors)) for k in range(count)])
+    return Scatter(False, laws, tops, levels, law_words(laws, part.channels))

@@ -12,8 +12,8 @@ from jaxtyping import Float
 
 from fitmat.fresnel import f0_from_eta, f0_from_ior
 from fitmat.outcome import Fit
+from fitmat.priors import natural_sd
 from fitmat.profile_likelihood import free_names
-from fitmat.ridge import prior_sd
 
 CONDITION = 30.0
 """Condition index from which columns of a Jacobian act alike: "moderate to strong" of Belsley, Kuh & Welsch (1980,
@@ -116,10 +116,11 @@ def groups(fit: Fit, draws: Float[np.ndarray, "m p"]) -> tuple[Group, ...]:
     """
     known = fit.information[np.ix_(fit.free, fit.free)]
     names, diagonal = free_names(fit), np.diagonal(known)
-    telling = np.flatnonzero(diagonal * prior_sd(fit) ** 2 > 1.0)
+    prior = natural_sd(fit.model, fit.data.prior)[fit.free]
+    telling = np.flatnonzero(diagonal * prior**2 > 1.0)
     if len(telling) < 2:
         return ()
-    released = known[np.ix_(telling, telling)] + np.diag(prior_sd(fit)[telling] ** -2.0)
+    released = known[np.ix_(telling, telling)] + np.diag(prior[telling] ** -2.0)
     size = np.sqrt(np.diagonal(released))
     values, vectors = np.linalg.eigh(released / np.outer(size, size))
     values = np.maximum(values, values[-1] * 1e-15)

@@ -16,8 +16,9 @@ from fitmat.likelihood import every_residual
 from fitmat.outcome import Fit
 from fitmat.params import space, with_vector
 from fitmat.posterior import Posterior
+from fitmat.priors import natural_sd
 from fitmat.profile_likelihood import Profile, profiles
-from fitmat.ridge import prior_sd, ridge
+from fitmat.ridge import ridge
 
 CATALOGUE = Path(__file__).parents[1] / "data" / "synthetic"
 
@@ -134,7 +135,7 @@ def test_a_prior_that_tells_all_is_not_the_data() -> None:
     value = 0.3 / np.pi * (1 + 0.01 * rng.normal(size=60))
     m = fm.from_arrays(theta, 0.5, value, sigma=np.full(60, 0.003 / np.pi), instrument=fm.Instrument(calibration=0.03))
     found = fm.fit(m, "lambert")
-    assert prior_sd(found) == pytest.approx([1 / np.sqrt(12), 0.03])
+    assert natural_sd(found.model, found.data.prior)[found.free] == pytest.approx([1 / np.sqrt(12), 0.03])
     verdicts = identify(fm.laplace(found, seed=1))
     scale = next(v for v in verdicts.verdicts if v.name == "scale")
     assert scale.state == STATES[2]
