@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fitmat.brdf import AbstractBRDF, model
-from fitmat.folder import write_text
+from fitmat.files import write_text
 from fitmat.formats import csv
 from fitmat.measurement import Measurements
 from fitmat.synthetic import simulate

@@ -11,7 +11,7 @@ from pathlib import Path
 from fitmat.errors import OutputError
 from fitmat.examination import Examination, examine
 from fitmat.examination.plots import plot_examination
-from fitmat.folder import write_bytes
+from fitmat.files import write_bytes
 from fitmat.measurement import Measurements
 
 PICTURES = ("png", "svg", "pdf")

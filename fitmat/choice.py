@@ -11,13 +11,13 @@ import numpy as np
 
 from fitmat.brdf import LOBES
 from fitmat.crossvalidation import LeftOut, leave_incidences_out
-from fitmat.display import html_table, text_table
 from fitmat.errors import FitmatError
 from fitmat.evidence import Evidence, weigh
 from fitmat.measurement import Measurements
 from fitmat.outcome import Fit
 from fitmat.plausibility import broken_laws, doubts
 from fitmat.posterior import Posterior
+from fitmat.text import html_table, text_table
 
 SMALL, SURE = 4.0, 2.0
 """A difference of elpd is clear from 4 on and beyond 2 standard errors (Sivula, Magnusson, Matamoros & Vehtari 2020:

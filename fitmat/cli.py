@@ -78,7 +78,7 @@ def fit(
 ) -> None:
     """Fit models to a file of measurements and write a report with the Phong–microfacet match."""
     _setup()
-    from fitmat import conditions, console, folder, priors, report, screen
+    from fitmat import conditions, console, files, priors, report, screen
     from fitmat.measurement import Measurements
     from fitmat.params import assignments
 
@@ -86,16 +86,16 @@ def fit(
     measurements = console.source(file, reading | {"instrument": instrument})
     shown = measurements if isinstance(measurements, Measurements) else measurements.part
     known = conditions.prepared(console.model_names(models, shown), shown, ior=ior, tilt=tilt)
-    target = out or folder.default(file)
-    with folder.new(target, force=force, stale=report.POSTERIOR.format("*")) as draft:
+    target = out or files.default(file)
+    with files.new(target, force=force, stale=report.POSTERIOR.format("*")) as draft:
         process.leave_on_interrupt(draft)
         plan = console.Plan(
-            known, fixed, believed, loss, masking, not no_mcmc, seed, check_posterior, folder.resumed(target)
+            known, fixed, believed, loss, masking, not no_mcmc, seed, check_posterior, files.resumed(target)
         )
         found = console.study(measurements, plan)
         report.write(draft, found)
     if not no_mcmc:
-        folder.discard(folder.resumed(target))
+        files.discard(files.resumed(target))
     if json_:
         sys.stdout.write((target / "fit.json").read_text(encoding="utf-8"))
     else:

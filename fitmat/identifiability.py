@@ -8,7 +8,6 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.display import html_table, interval, text_table, with_error
 from fitmat.information import UNDETERMINED
 from fitmat.outcome import Fit
 from fitmat.params import space
@@ -16,6 +15,7 @@ from fitmat.posterior import Posterior
 from fitmat.priors import natural_sd
 from fitmat.profile_likelihood import Profile, profiles
 from fitmat.ridge import Ridge, ridge
+from fitmat.text import html_table, interval, text_table, with_error
 from fitmat.trade_offs import Group, groups
 
 DRAWS = 4000

@@ -16,12 +16,12 @@ from jaxtyping import Array, Float
 from fitmat.apparent import Apparent, apparent
 from fitmat.approximation import draws
 from fitmat.density import log_density_at, physical
-from fitmat.display import html_table, text_table
 from fitmat.errors import FitmatError
 from fitmat.likelihood import mapped
 from fitmat.outcome import Fit
 from fitmat.params import space
 from fitmat.posterior import ENOUGH_ESS, GOOD_RHAT, Posterior
+from fitmat.text import html_table, text_table
 
 AGREEING = 4.0
 """Monte Carlo standard errors by which two numbers may differ by chance: 1 in 16,000 for a Gaussian."""

@@ -14,13 +14,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat.brdf import AbstractBRDF, evaluate_pairs
-from fitmat.display import html_table, text_table, with_error
 from fitmat.information import FOLLOWS, MISSES, covariance, information
 from fitmat.likelihood import Data, best_discrepancy, first_discrepancy, noise_scale
 from fitmat.losses import DEFAULT, Loss
 from fitmat.measurement import Measurements
 from fitmat.noise import Noise
 from fitmat.params import Entry, entries, space, vector, with_vector
+from fitmat.text import html_table, text_table, with_error
 
 AGREE = 0.1
 """Starts whose log-likelihood is within this of the best have found the same optimum."""

@@ -14,11 +14,11 @@ import numpy as np
 
 from fitmat.comparison import is_microfacet
 from fitmat.design import MATCH, Design, Proposal, next_angles
-from fitmat.display import plain, text_table
 from fitmat.errors import OutputError
-from fitmat.folder import write_bytes
+from fitmat.files import write_bytes
 from fitmat.params import space
 from fitmat.posterior import Posterior
+from fitmat.text import plain, text_table
 
 PICTURES = ("png", "svg", "pdf")
 DPI = 150

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.display import html_table, text_table, with_error
 from fitmat.outcome import Fit
+from fitmat.text import html_table, text_table, with_error
 
 VERDICTS = {
     "reliable": "The walks are long enough and agree with each other.",

@@ -12,7 +12,6 @@ import numpy as np
 from jaxtyping import Array
 
 from fitmat.brdf import AbstractBRDF, evaluate_pairs
-from fitmat.display import html_table, text_table
 from fitmat.errors import FitmatError
 from fitmat.incidences import incidences
 from fitmat.likelihood import Data, inferred_noise, mapped
@@ -20,6 +19,7 @@ from fitmat.losses import DEFAULT
 from fitmat.params import with_vector
 from fitmat.posterior import Posterior
 from fitmat.predictive_statistics import Look, Statistic
+from fitmat.text import html_table, text_table
 
 DRAWS = 200
 """Posterior draws behind every p-value, where the file is not large."""

@@ -15,11 +15,11 @@ from jaxtyping import ArrayLike, Float
 from scipy.stats import truncnorm
 
 from fitmat.brdf import AbstractBRDF
-from fitmat.display import with_error
 from fitmat.errors import ModelError
 from fitmat.instrument import Instrument
 from fitmat.likelihood import Prior
 from fitmat.params import Entry, entries, space, vector
+from fitmat.text import with_error
 
 DISCREPANCY = "discrepancy"
 """Name under which s has a prior: centre 0, and the sd of a Gaussian of which s is the size (half-normal)."""

@@ -9,7 +9,6 @@ from typing import Any
 from fitmat import priors
 from fitmat.choice import Choice
 from fitmat.comparison import Comparison
-from fitmat.display import plain
 from fitmat.estimate import Estimate
 from fitmat.identifiability import Identifiability
 from fitmat.metrics import fit_metrics
@@ -18,6 +17,7 @@ from fitmat.posterior import Posterior
 from fitmat.sphere import Perceived, Spread
 from fitmat.study import Study
 from fitmat.summary import Quantity, derived, parameters
+from fitmat.text import plain
 
 
 def to_dict(study: Study) -> dict[str, Any]:

@@ -22,7 +22,6 @@ from fitmat import plots, priors, record
 from fitmat.ablation import EXPLAINS, TERMS
 from fitmat.choice import Choice
 from fitmat.comparison import Comparison
-from fitmat.display import interval, with_error
 from fitmat.distances import METRICS
 from fitmat.headline import CLOSE, SIMILAR
 from fitmat.measurement import Measurements
@@ -37,6 +36,7 @@ from fitmat.sphere import CLEARLY_VISIBLE, JUST_NOTICEABLE
 from fitmat.study import Study
 from fitmat.summary import derived, parameters
 from fitmat.telling import SEPARATED
+from fitmat.text import interval, with_error
 
 DPI = 96
 CHANNELS_DRAWN = 3

@@ -11,7 +11,7 @@ import numpy as np
 from fitmat import catalogue, synthetic
 from fitmat.brdf import AbstractBRDF, model
 from fitmat.errors import ModelError, OutputError
-from fitmat.folder import write_text
+from fitmat.files import write_text
 from fitmat.formats import csv
 from fitmat.instrument import Instrument
 from fitmat.params import assignments

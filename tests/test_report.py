@@ -15,10 +15,10 @@ import pytest
 
 import fitmat
 from fitmat import console, record, report
-from fitmat.display import interval, with_error
 from fitmat.measurement import Measurements
 from fitmat.study import Study
 from fitmat.synthetic import simulate
+from fitmat.text import interval, with_error
 
 NAMES = ["lambert+blinn-phong", "lambert+ggx"]
 

@@ -13,8 +13,8 @@ import pytest
 from fitmat.brdf import AbstractBRDF, evaluate, model
 from fitmat.catalogue import MATERIALS, Material, write_catalogue
 from fitmat.errors import FitmatError, ModelError, OutputError
+from fitmat.files import write_text
 from fitmat.fitting import fit
-from fitmat.folder import write_text
 from fitmat.formats import csv, read
 from fitmat.measurement import from_arrays
 from fitmat.outcome import Fit

@@ -14,7 +14,7 @@ import polars as pl
 import pytest
 
 from fitmat.errors import OutputError, ReadError
-from fitmat.folder import write_bytes, write_text
+from fitmat.files import write_bytes, write_text
 from fitmat.formats import options, parquet, read, tabular, writing
 from fitmat.formats.reader import measured as finished
 from fitmat.formats.writing import write

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.display import plain
 from fitmat.examination import finding_words, words
 from fitmat.examination.consistency import Agreement, Consistency, consistency
 from fitmat.examination.coverage import Coverage, coverage, mirror_frame
@@ -21,6 +20,7 @@ from fitmat.examination.prospects import ASSUMED, Prospect, prospects
 from fitmat.examination.value_range import ValueRange, value_range
 from fitmat.measurement import Measurements
 from fitmat.noise import Noise, measured_noise, noise_law
+from fitmat.text import plain
 
 MOST_ESTIMATED = 100_000
 """Rows times channels above which a noise that the file does not give is not estimated from neighbours."""

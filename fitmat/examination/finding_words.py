@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fitmat.display import with_error
 from fitmat.examination import phrases as say
 from fitmat.examination.features import DEEP, Level, Peak, Tilt
 from fitmat.examination.implied_albedo import ImpliedAlbedo
 from fitmat.examination.phrases import Said
 from fitmat.examination.prospects import Prospect
+from fitmat.text import with_error
 
 VAGUE = np.deg2rad(5.0)
 """A peak that is placed no better than this (three standard deviations) is not placed."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fitmat.errors import OutputError
-from fitmat.folder import write_bytes
+from fitmat.files import write_bytes
 from fitmat.measurement import Measurements
 
 FORMATS = {".csv": "csv", ".parquet": "parquet", ".binary": "merl", ".bsdf": "zemax", ".alta": "alta"}
