@@ -20,10 +20,10 @@ from peer import Problem, from_sine
 import fitmat as fm
 from fitmat.fitting import Chart, descend
 from fitmat.likelihood import Data, first_discrepancy, prepare
+from fitmat.maths.least_squares import Minimum
 from fitmat.measurement import Measurements
 from fitmat.noise import measured_noise
 from fitmat.params import space, vector
-from fitmat.solver import Minimum
 
 TRUTH = {"kd": 0.3, "ks": 1.0, "alpha": 0.2, "eta": 1.5}
 START = {"kd": 0.45, "ks": 0.7, "alpha": 0.28, "eta": 1.9}

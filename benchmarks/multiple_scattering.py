@@ -25,10 +25,10 @@ from fitmat.brdf.kulla_conty import KullaConty
 from fitmat.brdf.microfacet import Microfacet
 from fitmat.energy import directional_albedo
 from fitmat.fresnel import AbstractFresnel, Conductor, White
-from fitmat.geometry import from_angles
+from fitmat.maths.directions import from_angles
+from fitmat.maths.quadrature import lobe_rule
 from fitmat.microfacet import GGX, Isotropic
 from fitmat.microsurface import Surface
-from fitmat.quadrature import lobe_rule
 from fitmat.slab import evaluate_slab
 from fitmat.walk import albedo_walk, evaluate_walk
 

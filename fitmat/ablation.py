@@ -24,9 +24,9 @@ from fitmat.conversion import exponent_from_alpha
 from fitmat.distances import ANGLES, AZIMUTHS, Values
 from fitmat.estimate import Estimate, band, estimate
 from fitmat.fresnel import AbstractFresnel
+from fitmat.maths.quadrature import lobe_rule
 from fitmat.microfacet import AbstractDistribution, Beckmann, Slopes
 from fitmat.params import with_vector
-from fitmat.quadrature import lobe_rule
 from fitmat.regions import GRAZING_DEG
 
 TERMS = {

@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import norm
 
-from fitmat.geometry import signed_zenith
 from fitmat.information import MISSES
 from fitmat.losses import bad_probability
+from fitmat.maths.directions import signed_zenith
 from fitmat.noise import leave_one_out
 from fitmat.outcome import Fit
 from fitmat.prediction import standardised_residuals

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float
 
-from fitmat.geometry import from_angles
+from fitmat.maths.directions import from_angles
 from fitmat.outcome import Fit
 from fitmat.prediction import sections
 

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from fitmat.brdf import AbstractBRDF
-from fitmat.quadrature import AZIMUTH_NODES, ZENITH_NODES, incidence_rule, lobe_rule
+from fitmat.maths.quadrature import AZIMUTH_NODES, ZENITH_NODES, incidence_rule, lobe_rule
 
 FINE = (ZENITH_NODES, AZIMUTH_NODES)
 

@@ -20,11 +20,11 @@ from fitmat.distances import AZIMUTHS, METRICS, direction_weight, incidence_weig
 from fitmat.errors import FitmatError
 from fitmat.fitting import STEADY, Chart
 from fitmat.likelihood import mapped
+from fitmat.maths.least_squares import least_squares
+from fitmat.maths.quadrature import Rule, lobe_rule
 from fitmat.outcome import Fit, free_places
 from fitmat.params import check_range, entries, space, vector, with_vector
-from fitmat.quadrature import Rule, lobe_rule
 from fitmat.regions import incidence_panels
-from fitmat.solver import least_squares
 from fitmat.starts import nonnegative
 
 LEAST_SQUARES = tuple(name for name, metric in METRICS.items() if metric.kind != "light")

@@ -8,7 +8,7 @@ import dataclasses
 import numpy as np
 from jaxtyping import Bool, Float
 
-from fitmat.geometry import zenith
+from fitmat.maths.directions import zenith
 
 MOST = 12
 """More angles than this are taken together, neighbours first, to so many groups."""

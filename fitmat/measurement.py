@@ -11,8 +11,8 @@ from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
 
 from fitmat.errors import ReadError
-from fitmat.geometry import from_angles, relative_azimuth, signed_zenith, zenith
 from fitmat.instrument import IDEAL, Instrument
+from fitmat.maths.directions import from_angles, relative_azimuth, signed_zenith, zenith
 
 IN_PLANE = np.deg2rad(0.5)
 """A sample whose azimuth is within this angle of the plane of incidence counts as in-plane."""

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from jax.scipy.special import erf
 
 from fitmat._types import Scalar, Vec3
-from fitmat.geometry import COS_MIN, Pair, pair, rotated
+from fitmat.maths.directions import COS_MIN, Pair, pair, rotated
 from fitmat.params import param
 
 Masking = Literal["correlated", "separable", "v-cavity"]

@@ -20,7 +20,7 @@ from jaxtyping import Array, Bool, Float
 
 from fitmat.errors import ModelError
 from fitmat.fresnel import AbstractFresnel, Dielectric, dielectric
-from fitmat.geometry import COS_MIN
+from fitmat.maths.directions import COS_MIN
 from fitmat.microfacet import GGX, AbstractDistribution, Beckmann, Slopes
 
 Walker = Float[Array, "n w"]

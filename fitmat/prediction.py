@@ -13,9 +13,9 @@ from jaxtyping import Array, Float
 from scipy.special import ndtri
 
 from fitmat.brdf import AbstractBRDF, evaluate, evaluate_pairs
-from fitmat.geometry import from_angles
 from fitmat.likelihood import Data, prepare, residuals
 from fitmat.losses import DEFAULT
+from fitmat.maths.directions import from_angles
 from fitmat.measurement import Measurements
 from fitmat.outcome import Fit
 from fitmat.params import with_vector

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat._types import Directions, Scalar
-from fitmat.quadrature import facets, lobe_rule
+from fitmat.maths.quadrature import facets, lobe_rule
 
 LIGHTS = {"front light": (20.0, 120.0), "side light": (60.0, 150.0), "rim light": (140.0, 45.0)}
 """Name → angle from the viewer and direction on the screen (counter-clockwise from the right), degrees."""

@@ -19,8 +19,8 @@ from scipy.ndimage import map_coordinates
 from fitmat import scene
 from fitmat.brdf import AbstractBRDF, evaluate_pairs, surface
 from fitmat.estimate import Estimate, estimate
-from fitmat.geometry import zenith
 from fitmat.likelihood import mapped
+from fitmat.maths.directions import zenith
 from fitmat.params import with_vector
 from fitmat.scene import Screen
 from fitmat.spectra import colouring, delta_e_2000, delta_e_itp, shown, to_srgb

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from fitmat.brdf import AbstractBRDF, Seen, evaluate
 from fitmat.errors import FitmatError, ModelError
-from fitmat.geometry import from_angles
 from fitmat.instrument import IDEAL, Instrument
+from fitmat.maths.directions import from_angles
 from fitmat.measurement import Measurements, from_arrays
 from fitmat.params import vector
 

@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import ArrayLike, Bool, Float
 
 from fitmat.errors import ModelError
-from fitmat.geometry import from_angles, zenith
-from fitmat.warp import Blend, Cell, Warp
+from fitmat.maths.directions import from_angles, zenith
+from fitmat.maths.warp import Blend, Cell, Warp
 
 UNIT = 1e-6
 """How far the length of a direction may be from 1."""

@@ -43,7 +43,7 @@ from fitmat.brdf.base import evaluate, evaluate_pairs
 from fitmat.brdf.disney_2012 import Disney2012
 from fitmat.brdf.disney_2015 import Disney2015
 from fitmat.brdf.disney_terms import Clearcoat, Perceptual, Sheen, tint
-from fitmat.geometry import from_angles
+from fitmat.maths.directions import from_angles
 from fitmat.params import entries, space, vector, with_vector
 
 SHADER = 1e-9

@@ -10,7 +10,7 @@ from oracles import ggx
 import fitmat as fm
 from fitmat.brdf import AbstractBRDF
 from fitmat.energy import directional_albedo, hemispherical_albedo
-from fitmat.quadrature import cosine_mean, curve, incidence, incidence_rule, lobe_rule
+from fitmat.maths.quadrature import cosine_mean, curve, incidence, incidence_rule, lobe_rule
 
 NARROW = 1e-3
 """Relative, the accuracy that `directional_albedo` claims, for lobes down to alpha = 0.002 and 80°."""

@@ -19,7 +19,7 @@ from fitmat.brdf.base import AbstractBRDF, evaluate
 from fitmat.brdf.oren_nayar import EnergyPreservingOrenNayar, OrenNayar, OrenNayarFull
 from fitmat.brdf.ward import Ward, WardBounded
 from fitmat.fresnel import Schlick
-from fitmat.geometry import from_angles
+from fitmat.maths.directions import from_angles
 from fitmat.microfacet import Anisotropic, Isotropic
 from fitmat.params import entries, space, vector, with_vector
 

@@ -14,10 +14,10 @@ from fitmat.brdf.kulla_conty import KullaConty
 from fitmat.brdf.microfacet import Microfacet
 from fitmat.energy import directional_albedo
 from fitmat.fresnel import White
-from fitmat.geometry import from_angles
+from fitmat.maths.directions import from_angles
+from fitmat.maths.quadrature import cosine_mean
 from fitmat.microfacet import GGX, AbstractDistribution, Beckmann, Isotropic
 from fitmat.params import entries, space, vector, with_vector
-from fitmat.quadrature import cosine_mean
 
 FURNACE = 0.01
 """Absolute; what the manual page claims for any alpha."""

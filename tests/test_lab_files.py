@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 import fitmat as fm
 from fitmat.errors import ReadError
 from fitmat.formats.reader import EXCHANGED
-from fitmat.geometry import from_angles
+from fitmat.maths.directions import from_angles
 
 JOINT = 3.0
 """Standard deviations of the difference that two fits of one sample may be apart."""

@@ -16,7 +16,7 @@ import fitmat as fm
 from fitmat import laws
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.brdf import LOBES, AbstractBRDF, evaluate_pairs, lobe_names
-from fitmat.geometry import from_angles
+from fitmat.maths.directions import from_angles
 from fitmat.microfacet import MASKINGS
 from fitmat.params import entries, param, space, vector, with_vector
 

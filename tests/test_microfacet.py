@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.special import erfc
 
-from fitmat.geometry import half_vector, pair
+from fitmat.maths.directions import half_vector, pair
 from fitmat.microfacet import (
     GGX,
     MASKINGS,

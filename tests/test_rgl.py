@@ -32,8 +32,8 @@ from test_tensor import MUTATORS
 
 from fitmat.errors import ModelError, ReadError
 from fitmat.formats import read, rgl, tensor
+from fitmat.maths.warp import Blend, Warp
 from fitmat.measurement import Measurements
-from fitmat.warp import Blend, Warp
 
 SINGLE = 1e-4
 """Relative; Mitsuba adds and subtracts single-precision integrals."""

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 import fitmat as fm
 from fitmat.brdf import evaluate_pairs
 from fitmat.brdf.tilt import Tilted
-from fitmat.geometry import from_angles
+from fitmat.maths.directions import from_angles
 from fitmat.outcome import Fit
 from fitmat.params import entries, space, vector, with_vector
 

@@ -15,10 +15,10 @@ from fitmat.brdf import evaluate
 from fitmat.brdf.microfacet import Microfacet
 from fitmat.errors import ModelError
 from fitmat.fresnel import AbstractFresnel, Conductor, Dielectric, White, conductor, dielectric
-from fitmat.geometry import from_angles
+from fitmat.maths.directions import from_angles
+from fitmat.maths.quadrature import lobe_rule
 from fitmat.microfacet import GGX, AbstractDistribution, Anisotropic, Beckmann, BeckmannRational
 from fitmat.microsurface import Surface, _beckmann_slopes, dot, flown, refraction_phase, visible_normal
-from fitmat.quadrature import lobe_rule
 from fitmat.slab import Depths, Flight, evaluate_slab, fly
 from fitmat.walk import MonteCarlo, albedo_walk, evaluate_walk
 

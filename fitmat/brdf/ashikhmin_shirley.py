@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.brdf.base import AbstractBRDF
 from fitmat.fresnel import Schlick
-from fitmat.geometry import COS_MIN, above, pair, rotated
+from fitmat.maths.directions import COS_MIN, above, pair, rotated
 from fitmat.params import param
 
 SERIES = 1e-4

@@ -12,10 +12,10 @@ from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.brdf.base import AbstractBRDF
 from fitmat.brdf.microfacet import Microfacet
 from fitmat.fresnel import Dielectric, dielectric
-from fitmat.geometry import COS_MIN, above
+from fitmat.maths.directions import COS_MIN, above
+from fitmat.maths.quadrature import curve, facets
 from fitmat.microfacet import GGX, Isotropic, Masking
 from fitmat.params import param
-from fitmat.quadrature import curve, facets
 
 NODES = (32, 16)
 """Of the integrals over the facets of a rough coat, zenith and azimuth.

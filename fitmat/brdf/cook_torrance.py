@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.brdf.base import AbstractBRDF, specular_weight
 from fitmat.fresnel import AbstractFresnel, Dielectric
-from fitmat.geometry import above, pair
+from fitmat.maths.directions import above, pair
 from fitmat.microfacet import Beckmann, Isotropic, Masking, visibility
 
 

@@ -20,7 +20,7 @@ from fitmat.brdf.disney_terms import (
     tinted,
 )
 from fitmat.fresnel import schlick
-from fitmat.geometry import COS_MIN, Pair, above
+from fitmat.maths.directions import COS_MIN, Pair, above
 from fitmat.microfacet import Slopes
 
 

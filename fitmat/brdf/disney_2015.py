@@ -20,7 +20,7 @@ from fitmat.brdf.disney_terms import (
     tint,
 )
 from fitmat.fresnel import dielectric, f0_from_eta, schlick
-from fitmat.geometry import Pair, above
+from fitmat.maths.directions import Pair, above
 from fitmat.params import param
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.fresnel import schlick
-from fitmat.geometry import Pair, rotated
+from fitmat.maths.directions import Pair, rotated
 from fitmat.microfacet import GGX, AbstractRoughness, Slopes, visibility
 from fitmat.params import param
 

@@ -8,9 +8,9 @@ from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.brdf.base import AbstractBRDF, specular_weight
 from fitmat.brdf.microfacet import Microfacet
 from fitmat.fresnel import AbstractFresnel, Dielectric, White, average
-from fitmat.geometry import above
+from fitmat.maths.directions import above
+from fitmat.maths.quadrature import Curve, cosine_mean, curve, lobe_rule
 from fitmat.microfacet import GGX, AbstractDistribution, Isotropic, Masking
-from fitmat.quadrature import Curve, cosine_mean, curve, lobe_rule
 
 NODES = (32, 16)
 """Of the quadrature of E(μ), zenith and azimuth; E is then off by at most 0.002, by 0.006 for alpha < 0.01."""

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.brdf.base import AbstractBRDF
-from fitmat.geometry import above
+from fitmat.maths.directions import above
 from fitmat.params import param
 
 

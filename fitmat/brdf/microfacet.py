@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.brdf.base import AbstractBRDF, specular_weight
 from fitmat.fresnel import AbstractFresnel, Dielectric
-from fitmat.geometry import above
+from fitmat.maths.directions import above
 from fitmat.microfacet import GGX, AbstractDistribution, AbstractRoughness, Isotropic, Masking, visibility
 
 

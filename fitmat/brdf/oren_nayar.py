@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.brdf.base import AbstractBRDF
-from fitmat.geometry import COS_MIN, above
+from fitmat.maths.directions import COS_MIN, above
 from fitmat.params import param
 
 MEAN_B = 2.0 / 3.0 - 64.0 / (45.0 * jnp.pi)

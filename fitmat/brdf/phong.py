@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.brdf.base import AbstractBRDF, specular_weight
-from fitmat.geometry import above, half_vector, mirror
+from fitmat.maths.directions import above, half_vector, mirror
 from fitmat.params import param
 
 _ALBEDO = "specular weight; about the lobe's albedo at normal incidence"

@@ -7,7 +7,7 @@ from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.brdf.base import AbstractBRDF
 from fitmat.brdf.coating import RoughCoat, Varnish
 from fitmat.brdf.lambert import Lambert
-from fitmat.geometry import above
+from fitmat.maths.directions import above
 from fitmat.microfacet import Masking
 from fitmat.params import param
 

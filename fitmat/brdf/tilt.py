@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.brdf.base import AbstractBRDF
-from fitmat.geometry import COS_MIN, above
+from fitmat.maths.directions import COS_MIN, above
 from fitmat.params import param
 
 

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.brdf.base import AbstractBRDF, specular_weight
-from fitmat.geometry import COS_MIN, above, half_vector
+from fitmat.maths.directions import COS_MIN, above, half_vector
 from fitmat.microfacet import AbstractRoughness, Beckmann, Isotropic
 
 _ALBEDO = "specular weight; about the lobe's albedo at normal incidence"

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.spatial import KDTree
 
-from fitmat.geometry import zenith
+from fitmat.maths.directions import zenith
 from fitmat.measurement import IN_PLANE, Measurements
 
 SAME = np.deg2rad(0.15)

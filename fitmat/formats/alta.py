@@ -19,7 +19,7 @@ from jaxtyping import Float
 from fitmat.errors import OutputError, ReadError
 from fitmat.formats import blocks, files
 from fitmat.formats.recording import Recording
-from fitmat.geometry import from_angles, zenith
+from fitmat.maths.directions import from_angles, zenith
 from fitmat.measurement import Measurements, default_channels
 
 Directions = Float[np.ndarray, "n 3"]

@@ -17,7 +17,7 @@ from fitmat.errors import ReadError
 from fitmat.formats import blocks, files
 from fitmat.formats.angles import ROUNDING
 from fitmat.formats.recording import Recording
-from fitmat.geometry import from_angles
+from fitmat.maths.directions import from_angles
 from fitmat.measurement import default_channels
 
 ANGLES = {"theta_i": "theta_i", "phi_i": "phi_i", "theta_s": "theta_o", "phi_s": "phi_o"}

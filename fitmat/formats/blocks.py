@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Int
 
 from fitmat.errors import ReadError
 from fitmat.formats.files import shown as shown
-from fitmat.geometry import from_angles
+from fitmat.maths.directions import from_angles
 
 _BOM = b"\xef\xbb\xbf"
 _WORD = r"^[A-Za-z]"

@@ -17,7 +17,7 @@ from jaxtyping import Float, Int
 from fitmat.errors import ReadError
 from fitmat.formats import blocks, files
 from fitmat.formats.recording import Recording
-from fitmat.geometry import from_angles
+from fitmat.maths.directions import from_angles
 from fitmat.measurement import default_channels
 
 ANGLES = {

@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float
 from fitmat.errors import ReadError
 from fitmat.formats import blocks, files
 from fitmat.formats.recording import Recording, pivot
-from fitmat.geometry import from_angles
+from fitmat.maths.directions import from_angles
 from fitmat.measurement import default_channels
 
 LIGHT = 90.0

@@ -22,7 +22,7 @@ from jaxtyping import Float
 from fitmat.errors import ReadError
 from fitmat.formats import blocks, files
 from fitmat.formats.recording import Recording
-from fitmat.geometry import from_angles
+from fitmat.maths.directions import from_angles
 from fitmat.measurement import default_channels
 
 COLOURS = {"monochrome": default_channels(1), "rgb": ("r", "g", "b"), "xyz": ("x", "y", "z"), "spectrum": ()}

@@ -13,7 +13,7 @@ from fitmat.formats.columns import assign
 from fitmat.formats.options import Options
 from fitmat.formats.recording import Recording, pivot
 from fitmat.formats.table import Table
-from fitmat.geometry import from_angles
+from fitmat.maths.directions import from_angles
 from fitmat.measurement import default_channels
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from fitmat.errors import ReadError
 from fitmat.formats import files
 from fitmat.formats.recording import Recording
-from fitmat.geometry import from_angles
+from fitmat.maths.directions import from_angles
 
 CHANNELS = ("r", "g", "b")
 

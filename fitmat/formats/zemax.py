@@ -20,7 +20,7 @@ from jaxtyping import Float, Int
 from fitmat.errors import OutputError, ReadError
 from fitmat.formats import blocks, files
 from fitmat.formats.recording import HORIZON, Recording
-from fitmat.geometry import from_angles, zenith
+from fitmat.maths.directions import from_angles, zenith
 from fitmat.measurement import Measurements, default_channels
 
 CHANNELS = {"monochrome": default_channels(1), "xyz": ("x", "y", "z"), "rgb": ("r", "g", "b")}

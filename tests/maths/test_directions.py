@@ -1,4 +1,4 @@
-"""Angles and directions: the conventions of `fitmat.geometry`, on cases that are known by hand."""
+"""Angles and directions: the conventions of `fitmat.maths.directions`, on cases that are known by hand."""
 
 import jax
 import jax.numpy as jnp
@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fitmat.geometry import (
+from fitmat.maths.directions import (
     above,
     cos_difference,
     from_angles,

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat._types import Directions, Scalar, Vec3
-from fitmat.geometry import rotated
+from fitmat.maths.directions import rotated
 
 ZENITH_NODES = 64
 AZIMUTH_NODES = 32
