@@ -21,8 +21,8 @@ import fitmat as fm
 from fitmat.fitting import Chart, descend
 from fitmat.likelihood import Data, first_discrepancy, prepare
 from fitmat.maths.least_squares import Minimum
-from fitmat.measurement import Measurements
-from fitmat.noise import measured_noise
+from fitmat.measurements.noise import measured_noise
+from fitmat.measurements.samples import Measurements
 from fitmat.params import space, vector
 
 TRUTH = {"kd": 0.3, "ks": 1.0, "alpha": 0.2, "eta": 1.5}

@@ -27,7 +27,7 @@ import polars as pl  # noqa: E402
 
 import fitmat as fm  # noqa: E402
 from fitmat import bulk  # noqa: E402
-from fitmat.formats import chunks  # noqa: E402
+from fitmat.measurements.large import chunks  # noqa: E402
 
 TRUTH: dict[str, Any] = {"kd": 0.3, "ks": 0.8, "alpha": 0.25, "eta": 1.5}
 BATCH = 400_000

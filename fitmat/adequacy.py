@@ -13,7 +13,7 @@ from scipy.stats import norm
 from fitmat.information import MISSES
 from fitmat.losses import bad_probability
 from fitmat.maths.directions import signed_zenith
-from fitmat.noise import leave_one_out
+from fitmat.measurements.noise import leave_one_out
 from fitmat.outcome import Fit
 from fitmat.prediction import standardised_residuals
 

@@ -17,7 +17,7 @@ from fitmat.apparent import Apparent, apparent
 from fitmat.density import default_walkers, log_posterior, physical
 from fitmat.information import inverse_information
 from fitmat.likelihood import noise_scale
-from fitmat.measurement import Measurements
+from fitmat.measurements.samples import Measurements
 from fitmat.outcome import Fit
 from fitmat.params import space
 from fitmat.posterior import GOOD_PARETO, Posterior

@@ -17,10 +17,10 @@ from fitmat import fitting
 from fitmat.brdf import AbstractBRDF
 from fitmat.information import FOLLOWS, covariance, expected_information, is_positive, observed_information
 from fitmat.likelihood import NEGLIGIBLE, Data, noise_scale
+from fitmat.measurements.large.noise import Scatter, scatter
+from fitmat.measurements.large.stream import Progress, Rows
 from fitmat.outcome import Fit, named_outcome
 from fitmat.params import space, vector, with_vector
-from fitmat.rows import Progress, Rows
-from fitmat.scatter import Scatter, scatter
 from fitmat.sums import Sums, block_sums, blocks, prior_sums
 
 T = TypeVar("T")
@@ -59,7 +59,7 @@ def fit_chunks(
     together to the maximum of the likelihood of all rows; bounds are kept by projection (Bertsekas 1982, eq. 32).
 
     Args:
-        chunks: A file, from `fitmat.formats.chunks.scan`, or measurements in memory, from `fitmat.rows.held`.
+        chunks: A file, from `fitmat.measurements.large.chunks.scan`, or measurements in memory, from `fitmat.measurements.large.stream.held`.
         to: A model name ("lambert+ggx"), or a model whose shapes and static choices are used.
         fixed: Parameters to hold, by name: `{"ks": 1.0}`.
         priors: What is known beforehand, by name, as in `fitting.fit`.

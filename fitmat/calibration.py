@@ -21,9 +21,9 @@ from fitmat.approximation import laplace
 from fitmat.brdf import AbstractBRDF, evaluate, evaluate_pairs, model
 from fitmat.errors import FitmatError
 from fitmat.fitting import fit
-from fitmat.instrument import IDEAL
 from fitmat.likelihood import Data, log_likelihood, mapped
-from fitmat.measurement import Measurements
+from fitmat.measurements.instrument import IDEAL
+from fitmat.measurements.samples import Measurements
 from fitmat.outcome import free_places
 from fitmat.params import entries, vector, with_vector
 from fitmat.posterior import Posterior

@@ -13,8 +13,8 @@ import numpy as np
 
 from fitmat.brdf import AbstractBRDF, model
 from fitmat.files import write_text
-from fitmat.formats import csv
-from fitmat.measurement import Measurements
+from fitmat.measurements.formats import csv
+from fitmat.measurements.samples import Measurements
 from fitmat.synthetic import simulate
 
 COMMAND = "fitmat simulate --catalogue data/synthetic"

@@ -12,7 +12,7 @@ from fitmat.errors import OutputError
 from fitmat.examination import Examination, examine
 from fitmat.examination.plots import plot_examination
 from fitmat.files import write_bytes
-from fitmat.measurement import Measurements
+from fitmat.measurements.samples import Measurements
 
 PICTURES = ("png", "svg", "pdf")
 DPI = 150

@@ -13,7 +13,7 @@ from fitmat.brdf import LOBES
 from fitmat.crossvalidation import LeftOut, leave_incidences_out
 from fitmat.errors import FitmatError
 from fitmat.evidence import Evidence, weigh
-from fitmat.measurement import Measurements
+from fitmat.measurements.samples import Measurements
 from fitmat.outcome import Fit
 from fitmat.plausibility import broken_laws, doubts
 from fitmat.posterior import Posterior

@@ -79,7 +79,7 @@ def fit(
     """Fit models to a file of measurements and write a report with the Phong–microfacet match."""
     _setup()
     from fitmat import conditions, console, files, priors, report, screen
-    from fitmat.measurement import Measurements
+    from fitmat.measurements.samples import Measurements
     from fitmat.params import assignments
 
     fixed, believed = assignments(fix or [], "--fix"), priors.assignments(prior or [])
@@ -161,7 +161,7 @@ def check(
     """Describe a file before any fit: what was measured where, how consistently, and what can be learnt from it."""
     _setup()
     from fitmat import checking
-    from fitmat.formats import read
+    from fitmat.measurements.reader import read
 
     found = checking.checked(read(file, **reading, instrument=instrument), plot, force=force)
     typer.echo(checking.as_json(found) if json_ else str(found))
@@ -182,7 +182,8 @@ def convert(
     force: options.Replace = False,
 ) -> None:
     """Write measurements in another format; what that cannot hold is said."""
-    from fitmat.formats import read, writing
+    from fitmat.measurements import writing
+    from fitmat.measurements.reader import read
 
     measurements = read(file, **reading)
     with warnings.catch_warnings():
@@ -231,7 +232,7 @@ def design(
     """Say which angles to measure next, and by how much they would narrow what is not yet known."""
     _setup()
     from fitmat import console, planning
-    from fitmat.formats import read
+    from fitmat.measurements.reader import read
     from fitmat.params import assignments
 
     measurements = read(file, **reading, instrument=instrument)

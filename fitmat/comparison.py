@@ -23,7 +23,7 @@ from fitmat.headline import CLOSE as CLOSE
 from fitmat.headline import SIMILAR as SIMILAR
 from fitmat.headline import STRONG_EVIDENCE as STRONG_EVIDENCE
 from fitmat.imitation import Imitation, imitate
-from fitmat.measurement import Measurements
+from fitmat.measurements.samples import Measurements
 from fitmat.outcome import Fit
 from fitmat.posterior import Posterior
 from fitmat.telling import Telling, tell_apart

@@ -9,7 +9,7 @@ from fitmat.brdf import LOBES, lobe_names, model
 from fitmat.brdf.registry import OVER
 from fitmat.errors import ModelError
 from fitmat.fresnel import Dielectric, f0_f82_from_ior
-from fitmat.measurement import IN_PLANE, Measurements
+from fitmat.measurements.samples import IN_PLANE, Measurements
 from fitmat.params import entries
 from fitmat.refraction import channel_wavelengths, index
 

@@ -23,14 +23,15 @@ from fitmat.bulk import fit_chunks
 from fitmat.choice import every_model
 from fitmat.comparison import Comparison, compare, is_empirical, is_microfacet
 from fitmat.errors import ModelError
-from fitmat.formats import chunks, read
 from fitmat.losses import DEFAULT
-from fitmat.measurement import Measurements
+from fitmat.measurements.large import chunks
+from fitmat.measurements.large.stream import Rows, held
+from fitmat.measurements.reader import read
+from fitmat.measurements.samples import Measurements
 from fitmat.outcome import Fit
 from fitmat.params import entries
 from fitmat.posterior import Posterior
 from fitmat.priors import DISCREPANCY
-from fitmat.rows import Rows, held
 from fitmat.study import Study, concluded
 from fitmat.uncertainty import resumable_steps, sample
 

@@ -13,8 +13,8 @@ from jaxtyping import Array, Float
 
 from fitmat.brdf import AbstractBRDF, evaluate_pairs
 from fitmat.fitting import refine
-from fitmat.incidences import incidences
 from fitmat.likelihood import Data, first_discrepancy, mapped, residuals
+from fitmat.measurements.incidences import incidences
 from fitmat.outcome import Fit
 from fitmat.params import with_vector
 

@@ -28,8 +28,8 @@ from fitmat.likelihood import (
 from fitmat.losses import DEFAULT
 from fitmat.losses import loss as find_loss
 from fitmat.maths.least_squares import Minimum, Units, least_squares
-from fitmat.measurement import Measurements
-from fitmat.noise import measured_noise
+from fitmat.measurements.noise import measured_noise
+from fitmat.measurements.samples import Measurements
 from fitmat.outcome import Ends, Fit, conclude, free_places
 from fitmat.params import Space, check_range, entries, space, vector, with_vector
 from fitmat.priors import prepared

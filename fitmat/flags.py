@@ -181,12 +181,12 @@ def instrument(
     receiver_angle: ReceiverAngle = 0.0,
     dark: Dark = "0",
 ) -> Any:
-    """The `fitmat.instrument.Instrument` that the flags describe.
+    """The `fitmat.measurements.instrument.Instrument` that the flags describe.
 
     Raises:
         ReadError: --dark is neither a number nor "fit", or a number is out of range.
     """
-    from fitmat.instrument import Instrument
+    from fitmat.measurements.instrument import Instrument
 
     try:
         level = None if dark == "fit" else float(dark)

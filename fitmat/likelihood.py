@@ -20,8 +20,8 @@ from jaxtyping import Array, Float
 from fitmat._types import Directions, Samples, Scalar
 from fitmat.brdf import AbstractBRDF, Noisy, evaluate_pairs, padded_length
 from fitmat.losses import DEFAULT, Loss
-from fitmat.measurement import Measurements
-from fitmat.noise import Noise, levels
+from fitmat.measurements.noise import Noise, levels
+from fitmat.measurements.samples import Measurements
 from fitmat.params import space, vector
 from fitmat.stabilising import spread
 

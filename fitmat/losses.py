@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array
 
 from fitmat.errors import ModelError
-from fitmat.measurement import Measurements
+from fitmat.measurements.samples import Measurements
 from fitmat.stabilising import spread, stabilised
 
 Transform = Callable[[Array, Array, Array, Array], Array]

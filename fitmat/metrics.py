@@ -6,7 +6,7 @@ Compares no models with each other; `comparison` does.
 import numpy as np
 
 from fitmat.brdf import evaluate
-from fitmat.measurement import Measurements
+from fitmat.measurements.samples import Measurements
 from fitmat.outcome import Fit
 
 

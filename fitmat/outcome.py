@@ -17,8 +17,8 @@ from fitmat.brdf import AbstractBRDF, evaluate_pairs
 from fitmat.information import FOLLOWS, MISSES, covariance, information
 from fitmat.likelihood import Data, best_discrepancy, first_discrepancy, noise_scale
 from fitmat.losses import DEFAULT, Loss
-from fitmat.measurement import Measurements
-from fitmat.noise import Noise
+from fitmat.measurements.noise import Noise
+from fitmat.measurements.samples import Measurements
 from fitmat.params import Entry, entries, space, vector, with_vector
 from fitmat.text import html_table, text_table, with_error
 

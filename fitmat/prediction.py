@@ -16,7 +16,7 @@ from fitmat.brdf import AbstractBRDF, evaluate, evaluate_pairs
 from fitmat.likelihood import Data, prepare, residuals
 from fitmat.losses import DEFAULT
 from fitmat.maths.directions import from_angles
-from fitmat.measurement import Measurements
+from fitmat.measurements.samples import Measurements
 from fitmat.outcome import Fit
 from fitmat.params import with_vector
 from fitmat.posterior import Posterior

@@ -13,9 +13,9 @@ from jaxtyping import Array
 
 from fitmat.brdf import AbstractBRDF, evaluate_pairs
 from fitmat.errors import FitmatError
-from fitmat.incidences import incidences
 from fitmat.likelihood import Data, inferred_noise, mapped
 from fitmat.losses import DEFAULT
+from fitmat.measurements.incidences import incidences
 from fitmat.params import with_vector
 from fitmat.posterior import Posterior
 from fitmat.predictive_statistics import Look, Statistic

@@ -12,9 +12,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy import stats
 
-from fitmat.incidences import Incidence
 from fitmat.losses import DEFAULT
-from fitmat.noise import curves
+from fitmat.measurements.incidences import Incidence
+from fitmat.measurements.noise import curves
 from fitmat.outcome import Fit
 from fitmat.stabilising import from_stabilised
 

@@ -16,8 +16,8 @@ from scipy.stats import truncnorm
 
 from fitmat.brdf import AbstractBRDF
 from fitmat.errors import ModelError
-from fitmat.instrument import Instrument
 from fitmat.likelihood import Prior
+from fitmat.measurements.instrument import Instrument
 from fitmat.params import Entry, entries, space, vector
 from fitmat.text import with_error
 

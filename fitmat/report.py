@@ -24,7 +24,7 @@ from fitmat.choice import Choice
 from fitmat.comparison import Comparison
 from fitmat.distances import METRICS
 from fitmat.headline import CLOSE, SIMILAR
-from fitmat.measurement import Measurements
+from fitmat.measurements.samples import Measurements
 from fitmat.metrics import fit_metrics
 from fitmat.outcome import RESULTS, Fit
 from fitmat.params import space

@@ -12,8 +12,8 @@ from fitmat import catalogue, synthetic
 from fitmat.brdf import AbstractBRDF, model
 from fitmat.errors import ModelError, OutputError
 from fitmat.files import write_text
-from fitmat.formats import csv
-from fitmat.instrument import Instrument
+from fitmat.measurements.formats import csv
+from fitmat.measurements.instrument import Instrument
 from fitmat.params import assignments
 
 MOST_ANGLES = 10_000

@@ -14,8 +14,8 @@ from jaxtyping import Array, Float
 
 from fitmat.brdf import AbstractBRDF
 from fitmat.likelihood import Data, discrepancy_cost, log_likelihood, prepare, prior_residuals, residuals
-from fitmat.measurement import Measurements
-from fitmat.noise import Noise
+from fitmat.measurements.noise import Noise
+from fitmat.measurements.samples import Measurements
 from fitmat.params import space, vector, with_vector
 
 BLOCK = 2**15

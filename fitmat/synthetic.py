@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from fitmat.brdf import AbstractBRDF, Seen, evaluate
 from fitmat.errors import FitmatError, ModelError
-from fitmat.instrument import IDEAL, Instrument
 from fitmat.maths.directions import from_angles
-from fitmat.measurement import Measurements, from_arrays
+from fitmat.measurements.instrument import IDEAL, Instrument
+from fitmat.measurements.samples import Measurements, from_arrays
 from fitmat.params import vector
 
 

@@ -12,12 +12,13 @@ import pytest
 from scipy.optimize import minimize
 
 import fitmat as fm
-from fitmat import bulk, information, scatter
-from fitmat.formats import chunks, csv
-from fitmat.formats.chunks import Chunks
-from fitmat.instrument import Instrument
+from fitmat import bulk, information
 from fitmat.likelihood import log_density, prepare
-from fitmat.noise import measured_noise
+from fitmat.measurements.formats import csv
+from fitmat.measurements.instrument import Instrument
+from fitmat.measurements.large import chunks, noise
+from fitmat.measurements.large.chunks import Chunks
+from fitmat.measurements.noise import measured_noise
 from fitmat.outcome import Fit
 from fitmat.params import space, vector, with_vector
 from fitmat.sums import Sums, block_sums
@@ -198,7 +199,7 @@ def test_too_few_passes_are_named(coloured: Chunks, monkeypatch: pytest.MonkeyPa
 
 def _climber(scanned: Chunks) -> Any:
     start = fm.fit(scanned.part, "lambert")
-    return bulk._File(scanned, scatter.scatter(scanned), start, None), bulk._Range(start)
+    return bulk._File(scanned, noise.scatter(scanned), start, None), bulk._Range(start)
 
 
 def test_a_calibration_counts_once(tmp_path: Path) -> None:
@@ -247,7 +248,7 @@ def test_noise_that_is_not_given_is_estimated_as_in_one_piece(channels: int, tmp
     truth = fm.model("lambert+ggx", channels=channels, kd=0.3, alpha=0.3, eta=1.5)
     path = saved(measured(truth, 4, give_sigma=False), tmp_path / "plain.csv")
     scanned, whole = chunks.scan(path, rows=5_000, part=4_000), measured_noise(fm.read(path))
-    known = scatter.scatter(scanned)
+    known = noise.scatter(scanned)
     sigma = np.concatenate([known.of(chunk).sigma for chunk in scanned])
     agreeing = np.isclose(sigma, whole.sigma, rtol=LAW)
     assert agreeing.mean() > 0.99
@@ -263,7 +264,7 @@ def test_noise_that_cannot_be_estimated_is_unknown(tmp_path: Path) -> None:
     angles = rng.uniform(0.1, 1.3, (2, 3_000))
     path = saved(fm.from_arrays(angles[0], angles[1], rng.uniform(0.1, 0.2, 3_000), phi=2.0), tmp_path / "alone.csv")
     scanned = chunks.scan(path, rows=900)
-    part = scatter.scatter(scanned).of_part(scanned.part)
+    part = noise.scatter(scanned).of_part(scanned.part)
     whole = measured_noise(scanned.part)
     assert (part.known, part.words) == (whole.known, whole.words)
     np.testing.assert_allclose(part.sigma, whole.sigma)

@@ -12,8 +12,8 @@ from test_cli import Run, assert_refused, curves, shell, strict
 
 from fitmat import console
 from fitmat.errors import FitmatError
-from fitmat.instrument import UNKNOWN_SCALE, Instrument
-from fitmat.measurement import Measurements
+from fitmat.measurements.instrument import UNKNOWN_SCALE, Instrument
+from fitmat.measurements.samples import Measurements
 
 run, environment = test_cli.run, test_cli.environment
 

@@ -17,7 +17,7 @@ from fitmat.examination.examining import Examination, examine
 from fitmat.examination.features import peak
 from fitmat.examination.implied_albedo import implied_albedo
 from fitmat.examination.prospects import prospects
-from fitmat.noise import noise_law
+from fitmat.measurements.noise import noise_law
 
 SEEDS = 20
 """Draws of the noise; a check that raises a false alarm in 14 % of clean files is caught in 95 of 100 cases."""

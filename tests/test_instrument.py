@@ -10,8 +10,8 @@ import fitmat as fm
 from fitmat.brdf import AbstractBRDF, Seen, surface
 from fitmat.brdf.seen import cone_rule
 from fitmat.errors import ReadError
-from fitmat.instrument import IDEAL, Instrument
 from fitmat.maths.directions import from_angles
+from fitmat.measurements.instrument import IDEAL, Instrument
 
 DEGREE = np.pi / 180
 THETA_I = np.array([10.0, 30.0, 50.0, 70.0]) * DEGREE

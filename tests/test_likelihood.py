@@ -24,7 +24,7 @@ from fitmat.likelihood import (
     prepare,
     residuals,
 )
-from fitmat.noise import Noise
+from fitmat.measurements.noise import Noise
 from fitmat.stabilising import from_stabilised, spread, stabilised
 
 QUADRATURE = 1e-9

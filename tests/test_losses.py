@@ -16,7 +16,7 @@ from fitmat.brdf import AbstractBRDF, Noisy, evaluate
 from fitmat.errors import FitmatError, ModelError
 from fitmat.likelihood import Data, log_likelihood, prepare
 from fitmat.losses import BAD_SHARE, BAD_SPREAD, LOSSES, T_DOF, bad_probability, loss
-from fitmat.noise import measured_noise
+from fitmat.measurements.noise import measured_noise
 from fitmat.params import vector, with_vector
 
 SIX_DIGITS = 1e-6

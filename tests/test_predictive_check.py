@@ -8,7 +8,7 @@ from scipy import stats
 
 import fitmat as fm
 from fitmat.errors import FitmatError
-from fitmat.incidences import incidences
+from fitmat.measurements.incidences import incidences
 from fitmat.outcome import Fit
 from fitmat.posterior import Posterior
 from fitmat.predictive_check import PredictiveCheck, check_predictions

@@ -8,7 +8,7 @@ from scipy import stats
 import fitmat as fm
 from fitmat import priors
 from fitmat.errors import ModelError
-from fitmat.instrument import IDEAL
+from fitmat.measurements.instrument import IDEAL
 from fitmat.params import entries, space
 
 EXACT = 1e-5

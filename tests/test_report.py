@@ -15,7 +15,7 @@ import pytest
 
 import fitmat
 from fitmat import console, record, report
-from fitmat.measurement import Measurements
+from fitmat.measurements.samples import Measurements
 from fitmat.study import Study
 from fitmat.synthetic import simulate
 from fitmat.text import interval, with_error

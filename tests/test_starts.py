@@ -11,7 +11,7 @@ from scipy.optimize import nnls
 
 import fitmat as fm
 from fitmat.likelihood import Data, prepare
-from fitmat.noise import measured_noise
+from fitmat.measurements.noise import measured_noise
 from fitmat.params import entries
 from fitmat.starts import nonnegative, starting_points
 

@@ -15,8 +15,9 @@ from fitmat.catalogue import MATERIALS, Material, write_catalogue
 from fitmat.errors import FitmatError, ModelError, OutputError
 from fitmat.files import write_text
 from fitmat.fitting import fit
-from fitmat.formats import csv, read
-from fitmat.measurement import from_arrays
+from fitmat.measurements.formats import csv
+from fitmat.measurements.reader import read
+from fitmat.measurements.samples import from_arrays
 from fitmat.outcome import Fit
 from fitmat.synthetic import simulate
 

@@ -15,8 +15,8 @@ from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.brdf.base import AbstractBRDF
 from fitmat.brdf.noisy import Noisy
 from fitmat.brdf.tilt import Tilted
-from fitmat.instrument import Instrument
 from fitmat.maths.directions import COS_MIN, above
+from fitmat.measurements.instrument import Instrument
 from fitmat.params import param
 
 RINGS, SPOKES = 5, 11

@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 from scipy.stats import chi2
 
 from fitmat.examination.coverage import settled
-from fitmat.measurement import IN_PLANE, Measurements
+from fitmat.measurements.samples import IN_PLANE, Measurements
 
 TOLERANCE = (np.deg2rad(0.01), np.deg2rad(0.5))
 """Two geometries count as the same within a quarter of the angular step, but not less or more than this."""

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 from scipy.spatial import KDTree
 
 from fitmat.maths.directions import zenith
-from fitmat.measurement import IN_PLANE, Measurements
+from fitmat.measurements.samples import IN_PLANE, Measurements
 
 SAME = np.deg2rad(0.15)
 """Incidence angles closer than this are one setting of the instrument."""

@@ -18,8 +18,8 @@ from fitmat.examination.implied_albedo import ImpliedAlbedo, implied_albedo
 from fitmat.examination.phrases import Said
 from fitmat.examination.prospects import ASSUMED, Prospect, prospects
 from fitmat.examination.value_range import ValueRange, value_range
-from fitmat.measurement import Measurements
-from fitmat.noise import Noise, measured_noise, noise_law
+from fitmat.measurements.noise import Noise, measured_noise, noise_law
+from fitmat.measurements.samples import Measurements
 from fitmat.text import plain
 
 MOST_ESTIMATED = 100_000

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.examination.coverage import Incidence
-from fitmat.measurement import IN_PLANE, Measurements
+from fitmat.measurements.samples import IN_PLANE, Measurements
 
 PROMINENT = 3.0
 """A peak below this many times the curve's median over the angle is no peak."""

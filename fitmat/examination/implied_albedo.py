@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 from scipy.spatial import Delaunay, QhullError
 
 from fitmat.examination.coverage import Incidence
-from fitmat.measurement import IN_PLANE, Measurements
+from fitmat.measurements.samples import IN_PLANE, Measurements
 
 ENOUGH = 0.8
 """Share of the projected hemisphere between samples from which they are added up without an assumption."""

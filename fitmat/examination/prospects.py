@@ -14,8 +14,8 @@ from jaxtyping import Array, Float
 
 from fitmat.brdf import AbstractBRDF, evaluate_pairs, model
 from fitmat.information import UNDETERMINED, inverse_information
-from fitmat.measurement import Measurements
-from fitmat.noise import noise_law
+from fitmat.measurements.noise import noise_law
+from fitmat.measurements.samples import Measurements
 from fitmat.params import entries, space, vector, with_vector
 
 ROWS = 2048

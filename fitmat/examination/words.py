@@ -12,7 +12,7 @@ from fitmat.examination.consistency import Agreement, Consistency
 from fitmat.examination.coverage import NEAR, Coverage
 from fitmat.examination.phrases import LISTED, Said
 from fitmat.examination.value_range import ValueRange
-from fitmat.measurement import Measurements
+from fitmat.measurements.samples import Measurements
 
 GRAZING = np.deg2rad(60.0)
 """Files that stay below this zenith angle say nothing of grazing reflection."""

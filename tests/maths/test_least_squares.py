@@ -12,7 +12,6 @@ import pytest
 from jaxtyping import Array
 from oracles.nist_strd import DANWOOD, FORMULAS, MISRA1A, Problem, read_problem
 
-from fitmat.maths import least_squares
 from fitmat.maths.least_squares import Minimum, least_squares
 
 DIGITS = 6.0
@@ -139,7 +138,7 @@ def test_tall_problems_take_the_normal_equations_to_the_same_minimum(monkeypatch
         return MISRA1A.formula(b, x) - y
 
     def linear_solvers(limit: int) -> tuple[Minimum, str]:
-        monkeypatch.setattr(solver, "TALL", limit)
+        monkeypatch.setattr("fitmat.maths.least_squares.TALL", limit)
         program = str(jax.make_jaxpr(lambda b: least_squares(residual, b, tolerance=1e-12).x)(x0))
         return least_squares(residual, x0, tolerance=1e-12), program
 

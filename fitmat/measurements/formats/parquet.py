@@ -1,0 +1,80 @@
+"""Parquet: a columnar file's columns as a `Table`, and measurements as such a file.
+
+It knows no column name (`columns` does) and rounds nothing.
+"""
+
+import io
+import os
+
+import numpy as np
+import polars as pl
+
+from fitmat.errors import ReadError
+from fitmat.measurements.formats import csv
+from fitmat.measurements.parsing import contents, footer
+from fitmat.measurements.parsing.table import Table
+from fitmat.measurements.samples import Measurements
+
+MAGIC = b"PAR1"
+"""The first and the last four bytes of a Parquet file."""
+
+_PLAIN = (pl.Boolean, pl.Null, pl.String, pl.Categorical, pl.Enum, pl.Date, pl.Datetime, pl.Time)
+_SWELLING = 64
+_SMALL = 1 << 24
+
+
+def claims(head: bytes, size: int) -> bool:
+    """Whether the file begins as Parquet does."""
+    return size > 2 * len(MAGIC) and head.startswith(MAGIC)
+
+
+def load(path: str | os.PathLike[str]) -> Table:
+    """The file's columns, rows numbered from 1; nulls are missing cells, columns of lists and the like are left out.
+
+    Raises:
+        ReadError: the file is damaged, unpacks to far more than its size, or holds no rows.
+    """
+    source, raw = contents.name(path), contents.contents(path)
+    try:
+        lazy = pl.scan_parquet(io.BytesIO(raw))
+        schema = lazy.collect_schema()
+        flat = [name for name, kind in schema.items() if kind.is_numeric() or kind in _PLAIN]
+        rows = lazy.select(pl.len()).collect().item()
+        _refuse_swelling(source, len(raw), 8 * rows * len(flat))
+        _refuse_swelling(source, len(raw), footer.unpacked(raw, flat, rows))
+        cells = pl.DataFrame([_plain(column) for column in lazy.select(flat).collect()])
+        text = cells.select(pl.col(pl.String).str.len_bytes().sum())
+        _refuse_swelling(source, len(raw), sum(text.row(0)) if text.width else 0)
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, ValueError) as error:
+        reason = contents.shown(str(error).partition("\n")[0], 200)
+        expected = "expected a whole Parquet file. Was its download cut off?"
+        raise ReadError(f"{source}: its Parquet content cannot be read ({reason}), {expected}") from error
+    if cells.is_empty():
+        raise ReadError(
+            f"{source}: no rows of plain cells, expected at least one measured value. Check how it was made."
+        )
+    left = [name for name in schema if name not in flat]
+    notes = (f"Columns that hold no plain cells, not read: {contents.listed(left)}.",) if left else ()
+    return Table(source, tuple(cells.columns), cells, np.arange(1, cells.height + 1), notes)
+
+
+def dump(measurements: Measurements) -> bytes:
+    """The columns of `fitmat.measurements.formats.csv.columns` in full float64: what is read back is what was written."""
+    buffer = io.BytesIO()
+    pl.DataFrame(csv.columns(measurements)).write_parquet(buffer)
+    return buffer.getvalue()
+
+
+def _refuse_swelling(source: str, size: int, unpacked: int) -> None:
+    """Refuse what runs of equal values can promise in a few bytes."""
+    limit = max(_SWELLING * size, _SMALL)
+    if unpacked > limit:
+        got = f"{size} bytes that unpack to {unpacked}"
+        raise ReadError(f"{source}: {got}, expected at most {limit}. Write the table as CSV.")
+
+
+def _plain(column: pl.Series) -> pl.Series:
+    """Numbers as float64, NaN where there is none; everything else as text."""
+    if column.dtype.is_numeric() or column.dtype in (pl.Boolean, pl.Null):
+        return column.cast(pl.Float64).fill_null(np.nan)
+    return column.cast(pl.String)

@@ -1,0 +1,69 @@
+"""Instrument: what lies between a surface and the numbers of a file, apart from its noise.
+
+A description only; `fitmat.brdf.seen` is the model that follows from it, `fitmat.measurements.noise` the scatter.
+"""
+
+import dataclasses
+
+import numpy as np
+
+from fitmat.errors import ReadError
+
+WIDEST = np.deg2rad(30.0)
+"""Largest half-angle of an aperture, radians; beyond it the average over a cone is no small correction."""
+
+UNKNOWN_SCALE = 1.0
+"""Standard deviation of the logarithm of a scale of which nothing is known: a factor of e either way."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Instrument:
+    """A goniophotometer, as far as the values of a file depend on it.
+
+    Attributes:
+        source: Half-angle of the cone in which light reaches the sample, radians; 0 for a collimated beam.
+        receiver: Half-angle of the cone that the detector collects, radians; 0 for a distant small one.
+        calibration: Relative standard deviation of an error that all values share, such as that of the reference.
+        dark: Dark signal or stray light in units of f_r cosθ_o, sr⁻¹; None where it is to be fitted.
+
+    Raises:
+        ReadError: a number is out of range.
+    """
+
+    source: float = 0.0
+    receiver: float = 0.0
+    calibration: float = 0.0
+    dark: float | None = 0.0
+
+    def __post_init__(self) -> None:
+        limits = {"source": WIDEST, "receiver": WIDEST, "calibration": UNKNOWN_SCALE, "dark": 1.0}
+        for name, upper in limits.items():
+            value = getattr(self, name)
+            if value is not None and not (np.isfinite(value) and 0 <= value <= upper):
+                unit = " radians (half-angle)" if upper == WIDEST else ""
+                raise ReadError(f"{name} = {value:g} of the instrument, expected 0 to {upper:.4g}{unit}. Correct it.")
+
+    @property
+    def ideal(self) -> bool:
+        """Whether it shows the surface as it is."""
+        return self == IDEAL
+
+    def __str__(self) -> str:
+        """What is taken into account, in a sentence; empty for an ideal instrument."""
+        parts = []
+        for name, angle in (("source", self.source), ("receiver", self.receiver)):
+            if angle:
+                parts.append(f"{name} of {np.rad2deg(angle):g}° half-angle")
+        if self.calibration == UNKNOWN_SCALE:
+            parts.append("scale unknown")
+        elif self.calibration:
+            parts.append(f"calibration good to {100 * self.calibration:g} %, shared by all values")
+        if self.dark is None:
+            parts.append("dark signal fitted")
+        elif self.dark:
+            parts.append(f"dark signal {self.dark:g} sr⁻¹")
+        return f"Instrument: {'; '.join(parts)}." if parts else ""
+
+
+IDEAL = Instrument()
+"""One that shows the surface as it is."""

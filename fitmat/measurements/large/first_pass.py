@@ -1,0 +1,150 @@
+"""Look: what one pass over a large file finds out about all of it, and the rows that are kept to stand for it.
+
+It converts nothing and reads no file.
+"""
+
+import dataclasses
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from fitmat.measurements.large.stream import spread
+from fitmat.measurements.parsing.recording import Recording, mask
+from fitmat.measurements.parsing.table import Table
+
+
+class Look:
+    """What the first look finds out, chunk by chunk.
+
+    Attributes:
+        n_samples: Rows seen.
+        notes: Of all recordings.
+        thinning: One row in so many is kept.
+        widest: The row with the largest zenith angle.
+        kept: The rows kept.
+    """
+
+    def __init__(self, most: int) -> None:
+        self.notes = dict[str, None]()
+        self.n_samples, self.thinning = 0, 1
+        self.widest: Table | None = None
+        self.kept: list[Recording] = []
+        self._most, self._index, self._lowest = most, list[np.ndarray](), np.inf
+        self._counts, self._valid, self._negative = Counter[str](), 0, _Negatives()
+
+    def add(self, recording: Recording, table: Table) -> None:
+        """Count a chunk's rows and keep some of them."""
+        valid, masked = mask(magnitudes(recording, {}))
+        self.notes |= dict.fromkeys(recording.notes)
+        self._counts.update(masked)
+        self._valid += int(np.count_nonzero(valid))
+        self._negative = self._negative.with_those(recording.value, valid)
+        heights = np.nan_to_num(np.minimum(recording.wi[:, 2], recording.wo[:, 2]), nan=np.inf)
+        if heights.min() < self._lowest:
+            row = int(heights.argmin())
+            self._lowest = float(heights[row])
+            cells, lines = table.cells.slice(row, 1), table.lines[row : row + 1]
+            self.widest = dataclasses.replace(table, cells=cells, lines=lines)
+        self._keep(np.arange(self.n_samples, self.n_samples + len(heights)), recording)
+        self.n_samples += len(heights)
+
+    def _keep(self, index: Int[np.ndarray, " n"], recording: Recording) -> None:
+        self.kept.append(recording)
+        self._index.append(index)
+        at = len(self.kept) - 1
+        while True:
+            for k in range(at, len(self.kept)):
+                chosen = spread(self._index[k], self.thinning)
+                self._index[k], self.kept[k] = self._index[k][chosen], _rows(self.kept[k], chosen)
+            if sum(map(len, self._index)) <= self._most:
+                return
+            self.thinning, at = 2 * self.thinning, 0
+
+    @property
+    def sentinel(self) -> float | None:
+        """The one negative value, where there are several of it and no other."""
+        return self._negative.lowest if self._negative.alike else None
+
+    @property
+    def negatives(self) -> int:
+        """Negative values that are not masked."""
+        return 0 if self._negative.alike else self._negative.values
+
+    @property
+    def n_valid(self) -> int:
+        """Values that can be used."""
+        return self._valid - (self._negative.values if self._negative.alike else 0)
+
+    @property
+    def masked(self) -> dict[str, int]:
+        """Reason → rows masked for it."""
+        alike = {named(self._negative.lowest): self._negative.rows} if self._negative.alike else {}
+        return {reason: count for reason, count in {**self._counts, **alike}.items() if count}
+
+
+@dataclasses.dataclass(frozen=True)
+class _Negatives:
+    """The negative numbers seen: how many, their extremes, and how many values and rows with them are valid."""
+
+    count: int = 0
+    lowest: float = np.inf
+    highest: float = -np.inf
+    values: int = 0
+    rows: int = 0
+
+    @property
+    def alike(self) -> bool:
+        return self.count > 1 and self.lowest == self.highest
+
+    def with_those(self, value: np.ndarray, valid: np.ndarray) -> "_Negatives":
+        negative = value[value < 0]
+        used = valid & (value < 0)
+        return _Negatives(
+            self.count + len(negative),
+            float(np.min(negative, initial=self.lowest)),
+            float(np.max(negative, initial=self.highest)),
+            self.values + int(np.count_nonzero(used)),
+            self.rows + int(np.count_nonzero(used.any(axis=1))),
+        )
+
+
+def _rows(recording: Recording, keep: Bool[np.ndarray, " n"]) -> Recording:
+    """Some rows of a recording."""
+    return dataclasses.replace(
+        recording,
+        wi=recording.wi[keep],
+        wo=recording.wo[keep],
+        value=recording.value[keep],
+        sigma=None if recording.sigma is None else recording.sigma[keep],
+        doubts={reason: doubt[keep] for reason, doubt in recording.doubts.items()},
+    )
+
+
+def joined_rows(recordings: Sequence[Recording]) -> Recording:
+    """The rows of recordings of the same columns, one after the other."""
+    first = recordings[0]
+
+    def along(of: Callable[[Recording], Any]) -> np.ndarray:
+        return np.concatenate([of(recording) for recording in recordings])
+
+    return dataclasses.replace(
+        first,
+        wi=along(lambda r: r.wi),
+        wo=along(lambda r: r.wo),
+        value=along(lambda r: r.value),
+        sigma=None if first.sigma is None else along(lambda r: r.sigma),
+        doubts={reason: along(lambda r, key=reason: r.doubts[key]) for reason in first.doubts},
+    )
+
+
+def magnitudes(recording: Recording, doubts: Mapping[str, np.ndarray]) -> Recording:
+    """The recording without its signs, in which `mask` finds no sentinel of its own."""
+    return dataclasses.replace(recording, value=np.abs(recording.value), doubts={**recording.doubts, **doubts})
+
+
+def named(sentinel: float) -> str:
+    """The reason for which its rows are masked, as `fitmat.measurements.parsing.recording.mask` words it."""
+    return f"sentinel {sentinel:g}"

@@ -1,0 +1,80 @@
+"""Scatter: the noise of a file too large for memory, from the neighbours of its rows chunk by chunk.
+
+It is `noise.measured_noise` in two steps: what is to be known once, and σ of each chunk. It looks at no model.
+"""
+
+import dataclasses
+
+import numpy as np
+from jaxtyping import Float
+
+from fitmat.measurements.large.stream import Progress, Rows
+from fitmat.measurements.noise import Noise, at_level, law, law_words, leave_one_out, measured_noise
+from fitmat.measurements.samples import Measurements
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Scatter:
+    """What is known of a file's noise.
+
+    Attributes:
+        given: Whether the file gives σ; then nothing else is needed.
+        laws: For each channel, a (sr⁻¹) and b of σ² = a² + (b f)²; NaN where they cannot be estimated.
+        tops: The largest value of each channel, sr⁻¹.
+        levels: f at the rows of the part as their neighbours say it, (n, c).
+        words: One sentence for the report.
+    """
+
+    given: bool
+    laws: Float[np.ndarray, "c 2"]
+    tops: Float[np.ndarray, " c"]
+    levels: Float[np.ndarray, "n c"]
+    words: str
+
+    def of(self, chunk: Measurements) -> Noise:
+        """σ of a chunk's rows."""
+        if self.given:
+            return measured_noise(chunk)
+        columns = [leave_one_out(chunk, k)[0] for k in range(len(chunk.channels))]
+        return self._at(_smoothed(chunk, np.stack(columns, axis=1)))
+
+    def of_part(self, part: Measurements) -> Noise:
+        """σ of the rows of the part, whose neighbours were in their chunks."""
+        return measured_noise(part) if self.given else self._at(_smoothed(part, self.levels))
+
+    def _at(self, level: np.ndarray) -> Noise:
+        return Noise(at_level(self.laws, level, self.tops), bool(np.isfinite(self.laws).all()), self.words)
+
+
+def _smoothed(m: Measurements, level: np.ndarray) -> np.ndarray:
+    return np.where(np.isfinite(level), np.abs(level), np.abs(m.value))
+
+
+def scatter(chunks: Rows, progress: Progress | None = None) -> Scatter:
+    """The noise of a large file: one pass, unless the file gives σ.
+
+    Neighbours are sought in all rows of a chunk, a and b come from the rows of the part. Rows at either end of a chunk
+    have fewer neighbours than in one piece; a file in random order, in which neighbours are far apart, shows more noise
+    than there is.
+
+    Args:
+        chunks: The file.
+        progress: Called after each chunk.
+    """
+    part, count = chunks.part, len(chunks.part.channels)
+    if part.sigma is not None:
+        none = np.full((count, 2), np.nan)
+        return Scatter(True, none, none[:, 0], np.full(part.value.shape, np.nan), "")
+    found, tops, done = [], np.zeros(count), 0
+    for chunk in chunks:
+        kept = chunks.in_part(done, chunk.n_samples)
+        compared = [np.stack(leave_one_out(chunk, k), axis=1)[kept] for k in range(count)]
+        found.append(np.stack(compared, axis=2))
+        tops = np.maximum(tops, np.max(np.abs(chunk.value), axis=0, where=chunk.valid, initial=0.0))
+        done += chunk.n_samples
+        if progress is not None:
+            progress("noise", done, chunks.n_samples)
+    levels, errors, factors = np.concatenate(found).transpose(1, 0, 2)
+    smooth = _smoothed(part, levels)
+    laws = np.stack([law(errors[:, k], smooth[:, k], factors[:, k], tops[k], len(errors)) for k in range(count)])
+    return Scatter(False, laws, tops, levels, law_words(laws, part.channels))

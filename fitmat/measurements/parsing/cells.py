@@ -1,0 +1,133 @@
+"""Text of a table: text → lines → cells, whatever the delimiter, decimal mark, comments or header.
+
+It knows no column name and converts no number; a ragged row is refused, never repaired.
+"""
+
+import os
+import re
+
+import polars as pl
+
+from fitmat.errors import ReadError
+from fitmat.measurements.parsing import contents
+from fitmat.measurements.parsing.table import MISSING, Table
+
+WIDEST = 4096
+"""A table of more columns is refused; those of spectrometers have up to 2,000 channels."""
+
+_SPACED = re.compile(r"\d\s+[-+.]?\d")
+_COMMENT = r"^\s*(#|%|//)"
+_SEMICOLON = r"^\s*;"
+_BLANK = r"^[\s,;]*$"
+_QUOTED = r'"[^"]*"'
+_NUMBER = re.compile(r"[-+−]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?|[-+]?(?i:inf|infinity)")
+_SAMPLE = 20
+_DECIMAL_COMMA = r"^[-+−]?\d*,\d+([eE][-+]?\d+)?$"
+_DECIMAL_POINT = r"^[-+−]?\d*\.\d+([eE][-+]?\d+)?$"
+
+
+def load(path: str | os.PathLike[str]) -> Table:
+    """The table in a text file, its cells as text.
+
+    Raises:
+        ReadError: the file cannot be opened, is no text, or is no table of at least one row.
+    """
+    source = contents.name(path)
+    text, notes = contents.decoded(contents.contents(path), source)
+    return parse(text, source, notes)
+
+
+def parse(text: str, source: str, notes: tuple[str, ...], above: int = 0) -> Table:
+    """The table in a text whose first line is line `above` + 1 of its file."""
+    lines = pl.DataFrame({"text": re.split(r"\r\n|\r|\n", text)}).with_row_index("line", offset=1 + above)
+    lines = lines.filter(~pl.col("text").str.contains(_BLANK))
+    comment = lines["text"].str.contains(_COMMENT)
+    delimiter = _delimiter(lines.filter(~comment)["text"].head(_SAMPLE).to_list())
+    if delimiter != ";":
+        comment |= lines["text"].str.contains(_SEMICOLON)
+    rows = lines.filter(~comment)
+    if rows.is_empty():
+        expected = "expected a header line and rows of numbers. Is it the right file?"
+        raise ReadError(f"{source}: nothing but comments or blank lines, {expected}")
+    rows = rows.with_columns(text=_tidy(rows["text"], delimiter))
+    _refuse_ragged(rows, delimiter or "\t", source)
+    cells = _cells(rows, delimiter or "\t", source)
+    before = lines.filter(comment & (lines["line"] < rows["line"][0]) & lines["text"].str.contains(r"\pL"))
+    names = tuple(cells.row(0))
+    if any(_is_number(cell) for cell in names):
+        names = _commented(before["text"].tail(1).to_list(), delimiter, cells.width)
+    else:
+        rows, cells = rows.slice(1), cells.slice(1)
+    if cells.is_empty():
+        expected = "expected rows of numbers below it. Is the file complete?"
+        raise ReadError(f"{source}: a header and no rows ({contents.listed(names)}), {expected}")
+    table = Table(source, names, cells, rows["line"].to_numpy(), notes)
+    _refuse_mixed_decimals(table)
+    return table
+
+
+def _delimiter(lines: list[str]) -> str | None:
+    """Tab, semicolon or comma, whichever at least half of the lines hold; None stands for white space."""
+    lines = [line.strip() for line in lines if not re.match(_SEMICOLON, line)]
+    decimal_commas = not lines or _SPACED.search(lines[0]) or "," not in lines[0]
+    for mark in "\t;" if decimal_commas else "\t;,":
+        if 0 < len(lines) <= 2 * sum(mark in line for line in lines):
+            return mark
+    return None
+
+
+def _tidy(lines: pl.Series, delimiter: str | None) -> pl.Series:
+    """White space as one tab; no blanks between delimiter and quote, which CSV forbids and people write."""
+    if delimiter is None:
+        return lines.str.strip_chars().str.replace_all(r"\s+", "\t")
+    if lines.str.contains('"', literal=True).any():
+        return lines.str.strip_chars(" ").str.replace_all(f" *{delimiter} *", delimiter)
+    return lines
+
+
+def _refuse_ragged(rows: pl.DataFrame, delimiter: str, source: str) -> None:
+    text = rows["text"].str.replace_all(_QUOTED, "")
+    counts = text.str.count_matches(delimiter, literal=True) + 1
+    for row in (text.str.contains('"', literal=True)).arg_true()[:1]:
+        got = 'a quote (") without its end, expected pairs'
+        raise ReadError(f"{source} row {rows['line'][row]}: {got}. Remove it.")
+    if counts[0] > WIDEST:
+        expected = f"expected at most {WIDEST}, one for each angle and channel. Is it a table?"
+        raise ReadError(f"{source} row {rows['line'][0]}: {counts[0]} cells, {expected}")
+    for row in (counts != counts[0]).arg_true()[:1]:
+        got = f"{counts[row]} cells, expected {counts[0]} as in row {rows['line'][0]}"
+        raise ReadError(f"{source} row {rows['line'][row]}: {got}. Correct the line, or put # before it.")
+
+
+def _cells(rows: pl.DataFrame, delimiter: str, source: str) -> pl.DataFrame:
+    content = "\n".join(rows["text"].to_list()).encode()
+    try:
+        cells = pl.read_csv(content, separator=delimiter, has_header=False, infer_schema=False)
+    except pl.exceptions.PolarsError as error:
+        reason = contents.shown(str(error), 200)
+        got = f"not a table ({reason}), expected plain cells"
+        raise ReadError(f"{source}: {got}. Remove the quotes.") from error
+    return cells.select(pl.all().fill_null("").str.strip_chars())
+
+
+def _is_number(cell: str) -> bool:
+    return bool(_NUMBER.fullmatch(cell)) or cell.lower() in MISSING[1:]
+
+
+def _commented(comments: list[str], delimiter: str | None, width: int) -> tuple[str, ...]:
+    """Column names from the last comment line, where it has as many words as there are columns."""
+    for line in comments:
+        bare = re.sub(r"^\s*(#|%|//|;)+", "", line).strip()
+        for words in (bare.split(delimiter), bare.split()):
+            if len(words) == width:
+                return tuple(word.strip() for word in words)
+    return ("",) * width
+
+
+def _refuse_mixed_decimals(table: Table) -> None:
+    if not any(table.cells.select(pl.all().str.contains(",", literal=True).any()).row(0)):
+        return
+    if any(table.cells.select(pl.all().str.contains(_DECIMAL_POINT).any()).row(0)):
+        for column, commas in enumerate(table.cells.select(pl.all().str.contains(_DECIMAL_COMMA))):
+            expected = "one decimal mark in the file, which also has points. Write all numbers with a point."
+            table.refuse(column, commas.to_numpy(), expected)

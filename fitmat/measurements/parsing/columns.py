@@ -1,0 +1,262 @@
+"""Columns: which column of a table holds which quantity, by name, by alias, or as its user says.
+
+A column that could be two things, or two columns that could be one, are refused with the remedy.
+"""
+
+import dataclasses
+import re
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+from fitmat.errors import ReadError
+from fitmat.measurements.parsing.contents import listed
+from fitmat.measurements.parsing.table import Table
+from fitmat.measurements.quantity import QUANTITIES
+
+ALIASES = {
+    "theta_i": ("thetai", "theta_in", "theta_inc", "zenith_i", "incidence_angle", "angle_of_incidence", "aoi"),
+    "theta_o": ("thetao", "theta_out", "theta_r", "thetar", "zenith_o"),
+    "phi": ("dphi", "delta_phi", "phi_rel", "relative_azimuth"),
+    "phi_i": ("phii", "phi_in", "phi_inc", "azimuth_i"),
+    "phi_o": ("phio", "phi_out", "phi_r", "phir", "azimuth_o"),
+    "brdf": ("f_r", "fr", "bsdf"),
+    "brdf_cos": ("ccbrdf", "ccbsdf"),
+    "reflectance_factor": ("brf",),
+    "radiance": (),
+    "panel_ratio": ("ratio",),
+    "signal": ("reading", "counts"),
+    "reference": ("reference_signal", "white", "panel"),
+    "value": (),
+    "sigma": ("std", "brdf_sigma", "brdf_std"),
+    "sigma_reference": (),
+    "wavelength": ("wavelength_nm", "lambda", "lambda_nm"),
+    "channel": ("band",),
+    "valid": (),
+    "invalid": ("flag",),
+}
+"""Our name → its aliases; letter case, spaces, hyphens, Greek letters, [deg], [1/sr], [nm] do not matter."""
+
+VALUES = (*QUANTITIES, "signal", "value")
+EXAMPLE = 'columns="theta_i=Zenith,theta_o=3" (--columns)'
+
+_BESIDE = ("sigma", "reference", "sigma_reference")
+_KINDS = {alias: kind for kind, others in ALIASES.items() for alias in (kind, *others)}
+_GREEK = str.maketrans({"θ": "theta", "ϑ": "theta", "φ": "phi", "ϕ": "phi", "λ": "lambda", "σ": "sigma"})
+_UNIT = re.compile(r" ?[\[(](deg|degrees?|°|1/sr|sr-1|sr\^-1|sr\^\{-1\}|sr⁻¹|nm)[\])]\s*$")
+_CHANNELS = {"red": "r", "green": "g", "blue": "b"} | {name: name for name in "rgbxyz"}
+_RIVALS = (VALUES, ("wavelength", "channel"), ("phi", "phi_i"), ("phi", "phi_o"), ("sigma",))
+
+
+class Role(NamedTuple):
+    """What a column holds: one of `ALIASES`, and the channel of a value or sigma ("" where it has none)."""
+
+    kind: str
+    channel: str = ""
+
+    def __str__(self) -> str:
+        return "_".join(filter(None, self))
+
+
+@dataclasses.dataclass(frozen=True)
+class Columns:
+    """Where to find what: numbers are column positions from 0.
+
+    Attributes:
+        angles: theta_i, theta_o and, where given, phi or phi_i and phi_o.
+        values: Channel → column of the quantity.
+        sigmas: Channel → column of its σ; empty where there is none.
+        references: Channel → column of the reading of a white panel in the same geometry; empty where there is none.
+        reference_sigmas: Channel → column of that reading's σ.
+        marks: valid, invalid, wavelength, channel, where given.
+        quantity: One of `QUANTITIES`, or "signal", which becomes "panel_ratio" by its reference.
+        unused: Names of the columns that play no part.
+    """
+
+    angles: dict[str, int]
+    values: dict[str, int]
+    sigmas: dict[str, int]
+    references: dict[str, int]
+    reference_sigmas: dict[str, int]
+    marks: dict[str, int]
+    quantity: str
+    unused: tuple[str, ...]
+
+
+def assign(table: Table, columns: str | Mapping[str, str | int] | None, quantity: str | None) -> Columns:
+    """Find the columns that a BRDF needs: what the user said first, then what the header says.
+
+    Raises:
+        ReadError: a column is unknown, missing, there twice, or does not say what it holds.
+    """
+    said = _said(table, columns)
+    roles = said | _recognised(table, said)
+    angles = {k: roles[Role(k)] for k in ("theta_i", "theta_o", "phi", "phi_i", "phi_o") if Role(k) in roles}
+    _refuse_angles(table, angles)
+    kind, quantity = _quantity(table, roles, quantity)
+    values = {role.channel: column for role, column in roles.items() if role.kind == kind}
+    marks = {k: roles[Role(k)] for k in ("valid", "invalid", "wavelength", "channel") if Role(k) in roles}
+    if len(values) > 1 and "" in values:
+        raise ReadError(f"{table.source}: {kind} and {kind}_… columns, expected one kind. {_choose(kind)}")
+    if len(marks.keys() & {"wavelength", "channel"}) + any(values) > 1:
+        expected = "expected one channel per column, or one wavelength or channel column"
+        raise ReadError(f"{table.source}: channels named in two ways, {expected}. Remove one of them.")
+    sigmas, references, spreads = (_beside(table, kind, roles, values) for kind in _BESIDE)
+    _refuse_unreferenced(table, quantity, references)
+    used = {c for group in (angles, values, sigmas, references, spreads, marks) for c in group.values()}
+    unused = tuple(table.label(c) for c in range(len(table.names)) if c not in used)
+    return Columns(angles, values, sigmas, references, spreads, marks, quantity, unused)
+
+
+def role(name: str, *, any_channel: bool = False) -> Role | None:
+    """What a header name stands for, None where it is foreign; channels: r, g, b, x, y, z or a number (nm).
+
+    Example:
+        >>> role("BRDF_550nm")
+        Role(kind='brdf', channel='550')
+    """
+    plain = _UNIT.sub("", " ".join(name.split()).lower().translate(_GREEK)).strip()
+    plain = re.sub(r"[\s\-_]+", "_", plain)
+    if plain in _KINDS:
+        return Role(_KINDS[plain])
+    stem, _, channel = plain.rpartition("_")
+    kind = _KINDS.get(stem)
+    if kind not in (*VALUES, *_BESIDE):
+        return None
+    number = re.fullmatch(r"(\d+(?:\.\d+)?)(nm)?", channel)
+    known = number[1] if number else _CHANNELS.get(channel, channel if any_channel else "")
+    return Role(kind, known) if known else None
+
+
+def _said(table: Table, columns: str | Mapping[str, str | int] | None) -> dict[Role, int]:
+    """The user's mapping, our name → theirs, as roles and positions."""
+    found: dict[Role, int] = {}
+    for ours, theirs in _pairs(table, columns):
+        mine = role(ours, any_channel=True)
+        if mine is None:
+            known = ", ".join(ALIASES)
+            raise ReadError(f"{table.source}: columns maps {ours!r}, expected one of {known}. Write ours=theirs.")
+        column = _position(table, theirs)
+        if mine in found or column in found.values():
+            raise ReadError(f"{table.source}: columns maps {ours} or {theirs!r} twice, expected once. Remove one.")
+        found[mine] = column
+    return found
+
+
+def _pairs(table: Table, columns: str | Mapping[str, str | int] | None) -> Iterable[tuple[str, str | int]]:
+    if columns is None:
+        return ()
+    if isinstance(columns, Mapping):
+        return tuple((str(ours), theirs) for ours, theirs in columns.items())
+    parts = [part.partition("=") for part in str(columns).split(",")]
+    if not all(ours.strip() and theirs.strip() for ours, _, theirs in parts):
+        raise ReadError(f"{table.source}: columns = {columns!r}, expected pairs ours=theirs. Write {EXAMPLE}.")
+    return tuple((ours, theirs.strip()) for ours, _, theirs in parts)
+
+
+def _position(table: Table, theirs: str | int) -> int:
+    """The column of that name, or, where no column has it, of that number from 1."""
+    name = str(theirs).strip()
+    named = [(k, other) for k, other in enumerate(table.names) if other]
+    same = [k for k, other in named if other == name]
+    same = same or [k for k, other in named if other.lower() == name.lower()]
+    if len(same) > 1:
+        expected = f"expected one. Say which by its number, 1 to {len(table.names)}."
+        raise ReadError(f"{table.source}: {len(same)} columns are named {name}, {expected}")
+    if same:
+        return same[0]
+    if not name.isdecimal():
+        raise ReadError(f"{table.source}: no column {name!r}; {_found(table)}. Correct columns= (--columns).")
+    if not 1 <= int(name) <= len(table.names):
+        expected = f"expected 1 to {len(table.names)}. Correct columns= (--columns)."
+        raise ReadError(f"{table.source}: no column {name}, {expected}")
+    return int(name) - 1
+
+
+def _recognised(table: Table, said: Mapping[Role, int]) -> dict[Role, int]:
+    """The header's own roles, but for what the user's mapping replaces."""
+    kinds = {mine.kind for mine in said}
+    replaced = {rival for group in _RIVALS if kinds & {*group} for rival in group}
+    found: dict[Role, int] = {}
+    for column, name in enumerate(table.names):
+        mine = role(name)
+        if mine is None or mine in said or mine.kind in replaced or column in said.values():
+            continue
+        if mine in found:
+            both = f"columns {found[mine] + 1} and {column + 1} ({table.label(found[mine])}, {table.label(column)})"
+            raise ReadError(f"{table.source}: {both} are both {mine}, expected one. {_choose(str(mine))}")
+        found[mine] = column
+    return found
+
+
+def _refuse_angles(table: Table, angles: Mapping[str, int]) -> None:
+    missing = [name for name in ("theta_i", "theta_o") if name not in angles]
+    if missing:
+        expected = " and ".join(f"{name} (or {', '.join(ALIASES[name])})" for name in missing)
+        raise ReadError(f"{table.source}: {_found(table)}, expected {expected}. Name them: {EXAMPLE}.")
+    azimuths = angles.keys() - {"theta_i", "theta_o"}
+    if "phi" in azimuths and len(azimuths) > 1:
+        found = " and ".join(sorted(azimuths))
+        raise ReadError(f"{table.source}: {found}, expected phi, or phi_i and phi_o. {_choose('phi')}")
+    if len(azimuths & {"phi_i", "phi_o"}) == 1:
+        (alone,) = azimuths
+        remedy = f'If it is the relative azimuth, pass columns="phi={table.label(angles[alone])}" (--columns).'
+        raise ReadError(f"{table.source}: {alone} alone, expected phi_i and phi_o. {remedy}")
+
+
+def _quantity(table: Table, roles: Iterable[Role], quantity: str | None) -> tuple[str, str]:
+    """The kind of the value columns and the quantity they hold."""
+    kinds = [kind for kind in VALUES if any(mine.kind == kind for mine in roles)]
+    choices = ", ".join(QUANTITIES)
+    if not kinds:
+        expected = f"expected a measured quantity: {choices}, or value"
+        raise ReadError(f'{table.source}: {_found(table)}, {expected}. Name it: columns="brdf=3" (--columns).')
+    if quantity in kinds:
+        return quantity, quantity
+    if quantity and "value" in kinds:
+        return "value", quantity
+    if quantity:
+        got = f"quantity = {quantity}, but the column is named {kinds[0]}"
+        raise ReadError(f'{table.source}: {got}, expected them to agree. Rename it: columns="{quantity}={kinds[0]}".')
+    if len(kinds) > 1:
+        raise ReadError(f"{table.source}: {' and '.join(kinds)} at once, expected one quantity. {_choose(kinds[0])}")
+    if kinds == ["value"]:
+        why = "They differ by π or cos θ_o, which a fit would absorb unseen, so fitmat refuses to guess"
+        got = f"the column value does not say what it holds, expected {choices}"
+        raise ReadError(f"{table.source}: {got}. {why}: pass quantity= (--quantity).")
+    return kinds[0], kinds[0]
+
+
+def _beside(table: Table, kind: str, roles: Mapping[Role, int], values: Iterable[str]) -> dict[str, int]:
+    """One column of that kind per channel; a plain one serves every channel."""
+    given = {mine.channel: column for mine, column in roles.items() if mine.kind == kind}
+    if not given:
+        return {}
+    found = {channel: given.get(channel, given.get("", -1)) for channel in values}
+    if -1 in found.values() or given.keys() - found.keys() - {""}:
+        named, wanted = (", ".join(str(Role(kind, name)) for name in names) for names in (given, found))
+        remedy = f"Name them alike, or give one plain {kind}."
+        raise ReadError(f"{table.source}: {named} given, expected {wanted}. {remedy}")
+    return found
+
+
+def _refuse_unreferenced(table: Table, quantity: str, references: Mapping[str, int]) -> None:
+    if quantity == "signal" and not references:
+        expected = "expected a column reference beside it: the reading of a white panel in the same geometry"
+        remedy = (
+            "Without one, say what the signal is proportional to, for example "
+            '--columns "brdf_cos=signal" --unknown-scale.'
+        )
+        raise ReadError(f"{table.source}: signal alone, {expected}. {remedy}")
+    if references and quantity != "signal":
+        expected = "expected it beside signal only"
+        raise ReadError(f"{table.source}: a column reference beside {quantity}, {expected}. Rename or remove it.")
+
+
+def _found(table: Table) -> str:
+    if any(table.names):
+        return f"the columns are {listed(table.names)}"
+    return f"no header line and {len(table.names)} columns"
+
+
+def _choose(name: str) -> str:
+    return f'Choose: columns="{name}=3", by name or by number (--columns).'

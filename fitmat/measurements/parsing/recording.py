@@ -1,0 +1,105 @@
+"""Recording: what a file or an object holds, as it holds it; the one noun between the formats and the reader.
+
+It drops no row and converts no quantity: what a file marks as no datum stays, with its reason.
+"""
+
+import dataclasses
+
+import numpy as np
+import polars as pl
+from jaxtyping import Bool, Float
+
+from fitmat.measurements.parsing.angles import ROUNDING
+
+HORIZON = np.sin(ROUNDING)
+"""Cosine of a zenith angle at or below which a direction counts as horizontal."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Recording:
+    """n rows of c channels in the file's own quantity, NaN where it has nothing.
+
+    Attributes:
+        source: Name of the file or object, for messages and titles.
+        wi: Unit vectors to the light, (n, 3), local frame (n = +z); NaN where an angle is missing.
+        wo: Unit vectors to the sensor, (n, 3).
+        value: The measured quantity in its own unit, (n, c).
+        quantity: What that is, one of `fitmat.measurements.quantity.QUANTITIES`.
+        channels: c names.
+        sigma: Standard deviation in the unit of `value`, (n, c); None where unknown.
+        doubts: Reason → which values the file itself marks as no datum, (n, c).
+        notes: Plain sentences: conventions of the format, what was assumed.
+        distinct: Whether no geometry can occur twice, because the format is a grid.
+    """
+
+    source: str
+    wi: Float[np.ndarray, "n 3"]
+    wo: Float[np.ndarray, "n 3"]
+    value: Float[np.ndarray, "n c"]
+    quantity: str
+    channels: tuple[str, ...]
+    sigma: Float[np.ndarray, "n c"] | None = None
+    doubts: dict[str, Bool[np.ndarray, "n c"]] = dataclasses.field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    distinct: bool = False
+
+
+def pivot(long: Recording, labels: np.ndarray) -> Recording:
+    """Rows of one channel each, labelled, as one row for each geometry and repeat.
+
+    Args:
+        long: n rows of one channel.
+        labels: Channel of each row, (n,): text, in order of appearance, or wavelengths, in increasing order.
+
+    Returns:
+        Rows in the order in which their geometry first appears.
+    """
+    names, first, column = np.unique(labels, return_index=True, return_inverse=True)
+    order = np.arange(len(names)) if labels.dtype.kind == "f" else np.argsort(first)
+    column = np.argsort(order)[column]
+    geometry = [f"{vector}_{axis}" for vector in ("wi", "wo") for axis in "xyz"]
+    keys = pl.DataFrame(np.concatenate([long.wi, long.wo], axis=1), schema=geometry)
+    keys = keys.with_columns(label=pl.Series(column))
+    keys = keys.with_columns(repeat=pl.int_range(pl.len()).over(*geometry, "label")).with_row_index("row")
+    leader = keys.select(pl.col("row").first().over(*geometry, "repeat"))["row"].to_numpy()
+    rows, row = np.unique(leader, return_inverse=True)
+
+    def spread(flat: np.ndarray, blank: float | bool) -> np.ndarray:
+        wide = np.full((len(rows), len(names)), blank)
+        wide[row, column] = flat[:, 0]
+        return wide
+
+    absent = {"no row for a channel of this geometry": spread(np.zeros(long.value.shape, bool), True)}
+    return dataclasses.replace(
+        long,
+        wi=long.wi[rows],
+        wo=long.wo[rows],
+        value=spread(long.value, np.nan),
+        sigma=None if long.sigma is None else spread(long.sigma, np.nan),
+        doubts=absent | {reason: spread(doubt, False) for reason, doubt in long.doubts.items()},
+        channels=tuple(f"{name:.10g}" if labels.dtype.kind == "f" else str(name) for name in names[order]),
+    )
+
+
+def mask(recording: Recording) -> tuple[Bool[np.ndarray, "n c"], dict[str, int]]:
+    """What can be used, and how many rows are masked for each reason; a value counts for its first one."""
+    value, sigma = recording.value, recording.sigma
+    lowest = np.minimum(recording.wi[:, 2], recording.wo[:, 2])
+    reasons = recording.doubts | {
+        "angle missing or infinite": np.any(np.isnan(recording.wi + recording.wo), axis=1, keepdims=True),
+        "at or below the horizon": (lowest <= HORIZON)[:, None],
+        "value missing or NaN": np.isnan(value),
+        "value infinite": np.isinf(value),
+    }
+    if sigma is not None:
+        reasons["sigma missing, infinite or not positive"] = ~(np.isfinite(sigma) & (sigma > 0))
+    negative = value[value < 0]
+    if len(negative) > 1 and (negative == negative[0]).all():
+        reasons[f"sentinel {negative[0]:g}"] = value == negative[0]
+    valid = np.ones(value.shape, bool)
+    masked = {}
+    for reason, bad in reasons.items():
+        if bad.any():
+            masked[reason] = int((valid & bad).any(axis=1).sum())
+            valid &= ~bad
+    return valid, {reason: count for reason, count in masked.items() if count}

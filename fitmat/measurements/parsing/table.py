@@ -1,0 +1,146 @@
+"""Table: named columns of cells, each of which can say where it stands in its file.
+
+It opens no file (`text` does) and knows no column name (`columns` does).
+"""
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+import polars as pl
+from jaxtyping import Bool, Float, Int
+
+from fitmat.errors import ReadError
+from fitmat.measurements.parsing.contents import listed, shown
+
+MISSING = ("", "nan", "na", "n/a", "<na>", "null", "none", "-")
+"""Cells that hold no number and say so, in lower case."""
+
+_TRUTH = {"true": "1", "t": "1", "yes": "1", "y": "1", "false": "0", "f": "0", "no": "0", "n": "0"}
+_PLAIN = {"−": "-", ",": "."}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Table:
+    """n rows of cells, text or numbers.
+
+    Attributes:
+        source: Name of the file, for messages.
+        names: Header of each column; "" where there is none.
+        cells: The cells, columns in the order of `names`.
+        lines: Line number in the file of each row, (n,), from 1.
+        notes: What was found out while reading.
+    """
+
+    source: str
+    names: tuple[str, ...]
+    cells: pl.DataFrame
+    lines: Int[np.ndarray, " n"]
+    notes: tuple[str, ...] = ()
+
+    def where(self, row: int) -> str:
+        """File and line of a row, as messages begin."""
+        return f"{self.source} row {self.lines[row]}"
+
+    def label(self, column: int) -> str:
+        """A column's name, or its number where it has none."""
+        return shown(self.names[column]) or f"column {column + 1}"
+
+    def numbers(self, column: int) -> Float[np.ndarray, " n"]:
+        """The column as float64, NaN where a cell is empty.
+
+        Raises:
+            ReadError: a cell holds text; the first such cell is named.
+        """
+        return self._cast(column, self._lower(column), "a number")
+
+    def truths(self, column: int) -> Float[np.ndarray, " n"]:
+        """The column as 1 (true), 0 (false) or NaN (empty); other numbers as they are.
+
+        Raises:
+            ReadError: a cell is neither; the first such cell is named.
+        """
+        return self._cast(column, self._lower(column).replace(_TRUTH), "true or false")
+
+    def words(self, column: int) -> np.ndarray:
+        """The column as text, (n,), "" where a cell is empty."""
+        text = self.cells.to_series(column).cast(pl.String).fill_null("").str.strip_chars()
+        return text.to_numpy().astype(str)
+
+    def chosen(self, where: str) -> "Table":
+        """The rows in which a column has a value, `where` being NAME=VALUE.
+
+        Raises:
+            ReadError: no such column, or no such row; what there is is listed.
+        """
+        name, given, value = (part.strip() for part in where.partition("="))
+        if not given:
+            raise ReadError(f"{self.source}: where = {where!r} (--where), expected NAME=VALUE. Write material=Alu.")
+        if name not in self.names:
+            there = listed(self.names) or "none has a name"
+            raise ReadError(f"{self.source}: where = {where!r} (--where), expected a column of {there}. Correct it.")
+        words = self.words(self.names.index(name))
+        rows = np.flatnonzero(words == value)
+        if not len(rows):
+            found = list(dict.fromkeys(words.tolist()))
+            expected = f"expected one of {listed(found)}. Choose one (--where)"
+            raise ReadError(f"{self.source}: {shown(name)} is never {value!r}, {expected}.")
+        noted = (*self.notes, f"Only rows with {name} = {value}: {len(rows)} of {len(words)}.")
+        return dataclasses.replace(self, cells=self.cells[rows], lines=self.lines[rows], notes=noted)
+
+    def refuse(self, column: int, bad: Bool[np.ndarray, " n"], expected: str) -> None:
+        """Stop at the first bad cell of a column.
+
+        Raises:
+            ReadError: any of `bad` is true.
+        """
+        for row in np.flatnonzero(bad)[:1]:
+            cell = shown(str(self.cells.to_series(column)[int(row)])) or "(empty)"
+            raise ReadError(f"{self.where(row)}: {self.label(column)} = {cell}, expected {expected}")
+
+    def _lower(self, column: int) -> pl.Series:
+        return self.cells.to_series(column).cast(pl.String).fill_null("").str.strip_chars().str.to_lowercase()
+
+    def _cast(self, column: int, text: pl.Series, expected: str) -> Float[np.ndarray, " n"]:
+        if (cells := self.cells.to_series(column)).dtype.is_float():
+            return cells.to_numpy()
+        number = text.str.replace_many(_PLAIN).cast(pl.Float64, strict=False)
+        bad = (number.is_null() & ~text.is_in(MISSING)).to_numpy()
+        self.refuse(column, bad, f"{expected}. Correct the cell, or put # before the line to leave it out.")
+        return number.fill_null(np.nan).to_numpy()
+
+
+def from_arrays(arrays: Mapping[str, np.ndarray], source: str) -> Table:
+    """A table of 1-D arrays; rows are numbered from 1, masked entries become empty.
+
+    Raises:
+        ReadError: no rows, an array that is not 1-D, or arrays of unlike length.
+    """
+    columns = {str(name): _series(str(name), array, source) for name, array in arrays.items()}
+    lengths = {name: len(column) for name, column in columns.items()}
+    if len(set(lengths.values())) > 1:
+        got = listed(f"{shown(name)}: {length}" for name, length in lengths.items())
+        raise ReadError(f"{source}: columns of unlike length ({got}), expected one length. Give one value per row.")
+    if not sum(lengths.values()):
+        raise ReadError(f"{source}: no rows, expected at least one measured value. Check how it was made.")
+    cells = pl.DataFrame(list(columns.values()))
+    return Table(source, tuple(columns), cells, np.arange(1, cells.height + 1))
+
+
+def _series(name: str, array: np.ndarray, source: str) -> pl.Series:
+    try:
+        column = np.ma.asarray(array)
+        numeric = column.dtype.kind in "biuf"
+        filled = np.ma.filled(column.astype(float), np.nan) if numeric else np.ma.filled(column.astype(str), "")
+    except (TypeError, ValueError) as error:
+        got = f"column {shown(name)} is not an array ({shown(str(error), 200)})"
+        raise ReadError(f"{source}: {got}, expected (n,) numbers or texts. Give one value per row.") from error
+    if filled.ndim != 1:
+        expected = "expected (n,). Give one value per row, and each name once."
+        raise ReadError(f"{source}: column {shown(name)} has shape {filled.shape}, {expected}")
+    return pl.Series(name.encode("utf-8", "replace").decode(), filled if numeric else _sound(filled))
+
+
+def _sound(text: np.ndarray) -> list[str]:
+    """Text without the halves of characters that UTF-8 cannot hold."""
+    return [cell.encode("utf-8", "replace").decode() for cell in text.tolist()]

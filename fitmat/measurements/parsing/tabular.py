@@ -1,0 +1,97 @@
+"""Tabular: a table's named columns → a `Recording`.
+
+It opens no file and masks nothing.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fitmat.maths.directions import from_angles
+from fitmat.measurements.options import Options
+from fitmat.measurements.parsing import contents
+from fitmat.measurements.parsing.angles import directions
+from fitmat.measurements.parsing.columns import assign
+from fitmat.measurements.parsing.recording import Recording, pivot
+from fitmat.measurements.parsing.table import Table
+from fitmat.measurements.samples import default_channels
+
+
+def recording(table: Table, columns: str | Mapping[str, str | int] | None, options: Options) -> Recording:
+    """One row for each geometry and repeat.
+
+    Args:
+        table: Named columns.
+        columns: Our name → theirs, where the header has other names.
+        options: What the table does not say about itself.
+
+    Raises:
+        ReadError: a column is missing or doubtful, or a cell is not what it should be.
+    """
+    if options.where is not None:
+        table = table.chosen(options.where)
+    layout = assign(table, columns, options.quantity)
+    angles, assumed = directions(table, layout.angles, options)
+    theta_i, phi_i, theta_o, phi_o = angles.T
+    value, sigma = _stacked(table, layout.values), _stacked(table, layout.sigmas) if layout.sigmas else None
+    doubts = {"flagged invalid": np.broadcast_to(_flagged(table, layout.marks)[:, None], value.shape)}
+    if layout.quantity == "signal":
+        reference = _stacked(table, layout.references)
+        spread = _stacked(table, layout.reference_sigmas) if layout.reference_sigmas else None
+        doubts["reference reading not positive"] = ~(reference > 0)
+        value, sigma = _ratio((value, sigma), (np.where(reference > 0, reference, np.nan), spread))
+    unused = (f"Columns not used: {contents.listed(layout.unused)}.",) if layout.unused else ()
+    found = Recording(
+        source=table.source,
+        wi=from_angles(theta_i, phi_i),
+        wo=from_angles(theta_o, phi_o),
+        value=value,
+        quantity="panel_ratio" if layout.quantity == "signal" else layout.quantity,
+        channels=tuple(layout.values) if any(layout.values) else default_channels(1),
+        sigma=sigma,
+        doubts=doubts,
+        notes=(*table.notes, *assumed, *unused),
+    )
+    labels = _labels(table, layout.marks)
+    return found if labels is None else pivot(found, labels)
+
+
+def _stacked(table: Table, columns: Mapping[str, int]) -> np.ndarray:
+    return np.stack([table.numbers(column) for column in columns.values()], axis=1)
+
+
+def _ratio(
+    signal: tuple[np.ndarray, np.ndarray | None], reference: tuple[np.ndarray, np.ndarray | None]
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """y/r and its σ, √(σ_y² + (y/r σ_r)²)/r (JCGM 100:2008, eq. 10); a σ that is not given counts as 0."""
+    (y, sigma_y), (r, sigma_r) = signal, reference
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is masked
+        if sigma_y is None and sigma_r is None:
+            return y / r, None
+        apart, shared = (np.zeros_like(y) if sigma is None else sigma for sigma in (sigma_y, sigma_r))
+        return y / r, np.hypot(apart, y / r * shared) / r
+
+
+def _flagged(table: Table, marks: Mapping[str, int]) -> np.ndarray:
+    """Rows that the file calls invalid, (n,); an empty `valid` means no, an empty `flag` not raised."""
+    flagged = np.zeros(len(table.lines), bool)
+    if "valid" in marks:
+        flagged |= ~(np.nan_to_num(table.truths(marks["valid"])) != 0)
+    if "invalid" in marks:
+        flagged |= np.nan_to_num(table.truths(marks["invalid"])) != 0
+    return flagged
+
+
+def _labels(table: Table, marks: Mapping[str, int]) -> np.ndarray | None:
+    """Channel of each row, (n,), as wavelength or as text; None where columns are channels."""
+    if "wavelength" in marks:
+        labels = table.numbers(marks["wavelength"])
+        wrong, expected = ~(np.isfinite(labels) & (labels > 0)), "a wavelength in nm"
+    elif "channel" in marks:
+        labels = table.words(marks["channel"])
+        wrong, expected = labels == "", "the name of a channel"
+    else:
+        return None
+    column = marks.get("wavelength", marks.get("channel", 0))
+    table.refuse(column, wrong, f"{expected}. Correct the cell, or put # before the line to leave it out.")
+    return labels

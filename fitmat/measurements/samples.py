@@ -1,0 +1,182 @@
+"""Measurements: BRDF samples with their directions, channels, noise and mask; the one noun that every reader makes.
+
+It converts no quantity and reads no file.
+"""
+
+import dataclasses
+import html
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy.typing import ArrayLike
+
+from fitmat.errors import ReadError
+from fitmat.maths.directions import from_angles, relative_azimuth, signed_zenith, zenith
+from fitmat.measurements.instrument import IDEAL, Instrument
+
+IN_PLANE = np.deg2rad(0.5)
+"""A sample whose azimuth is within this angle of the plane of incidence counts as in-plane."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Measurements:
+    """n samples of a BRDF in c channels.
+
+    Attributes:
+        wi: Unit vectors to the light, (n, 3), local frame (n = +z).
+        wo: Unit vectors to the sensor, (n, 3).
+        value: f_r in sr⁻¹ without cosine, (n, c); what is masked holds 0.
+        sigma: Standard deviation of the measurement noise in sr⁻¹, (n, c); None where unknown.
+        valid: False where a value must not be used, (n, c).
+        channels: c names, in column order.
+        source: Where it came from, for messages and titles.
+        masked: Reason → number of rows masked for it.
+        notes: Plain sentences: factors applied, conventions assumed, oddities kept.
+        instrument: What the values owe to the instrument that took them.
+    """
+
+    wi: Float[np.ndarray, "n 3"]
+    wo: Float[np.ndarray, "n 3"]
+    value: Float[np.ndarray, "n c"]
+    sigma: Float[np.ndarray, "n c"] | None
+    valid: Bool[np.ndarray, "n c"]
+    channels: tuple[str, ...]
+    source: str = "array"
+    masked: dict[str, int] = dataclasses.field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    instrument: Instrument = IDEAL
+
+    @property
+    def n_samples(self) -> int:
+        """Rows, masked ones included."""
+        return len(self.wi)
+
+    @property
+    def n_masked(self) -> int:
+        """Rows in which at least one channel is masked."""
+        return int(np.count_nonzero(~self.valid.all(axis=1)))
+
+    @property
+    def n_valid(self) -> int:
+        """Values (rows × channels) that can be fitted."""
+        return int(np.count_nonzero(self.valid))
+
+    @property
+    def theta_i(self) -> Float[np.ndarray, " n"]:
+        """Zenith angle of incidence in radians."""
+        return zenith(self.wi)
+
+    @property
+    def phi_i(self) -> Float[np.ndarray, " n"]:
+        """Azimuth of incidence in radians, [0, 2π); 0 for light along the normal."""
+        return np.where(self.theta_i < IN_PLANE, 0.0, np.arctan2(self.wi[:, 1], self.wi[:, 0]) % (2 * np.pi))
+
+    @property
+    def theta_o(self) -> Float[np.ndarray, " n"]:
+        """Zenith angle of reflection in radians, 0 to π/2."""
+        return zenith(self.wo)
+
+    @property
+    def phi(self) -> Float[np.ndarray, " n"]:
+        """Relative azimuth in radians, [0, π]; π is the mirror side."""
+        return relative_azimuth(self.wi, self.wo)
+
+    @property
+    def signed_theta_o(self) -> Float[np.ndarray, " n"]:
+        """theta_o in radians, positive on the mirror side."""
+        return signed_zenith(self.wi, self.wo)
+
+    @property
+    def in_plane(self) -> Bool[np.ndarray, " n"]:
+        """Which rows lie in the plane of incidence (all azimuths do where ω_i or ω_o is the normal)."""
+        phi = self.phi
+        aside = np.minimum(phi, np.pi - phi)
+        return (aside < IN_PLANE) | (self.theta_i < IN_PLANE) | (self.theta_o < IN_PLANE)
+
+    def rows(self, keep: np.ndarray) -> "Measurements":
+        """The rows selected by a mask or by indices; counts of what was masked stay those of the source."""
+        sigma = None if self.sigma is None else self.sigma[keep]
+        return dataclasses.replace(
+            self, wi=self.wi[keep], wo=self.wo[keep], value=self.value[keep], sigma=sigma, valid=self.valid[keep]
+        )
+
+    def _repr_html_(self) -> str:
+        return "<br>".join(html.escape(line) for line in str(self).splitlines())
+
+    def __str__(self) -> str:
+        """A few plain lines: how much, which channels, which angles, what was masked, what was assumed."""
+        angles = np.unique(np.round(np.rad2deg(self.theta_i), 1))
+        listed = ", ".join(f"{a:g}°" for a in angles[:8]) + (" …" if len(angles) > 8 else "")
+        lines = [
+            f"{self.source}: {self.n_samples} samples, channels {', '.join(self.channels)}",
+            f"incidence {listed}; sigma {'given' if self.sigma is not None else 'not given'}",
+        ]
+        lines += [f"{count} masked: {reason}" for reason, count in self.masked.items()]
+        return "\n".join([*lines, *self.notes, *filter(None, [str(self.instrument)])])
+
+
+def from_arrays(
+    theta_i: ArrayLike,
+    theta_o: ArrayLike,
+    value: ArrayLike,
+    *,
+    phi: ArrayLike = np.pi,
+    phi_i: ArrayLike = 0.0,
+    sigma: ArrayLike | None = None,
+    channels: tuple[str, ...] | None = None,
+    source: str = "array",
+    instrument: Instrument = IDEAL,
+) -> Measurements:
+    """Measurements from angles in **radians** and BRDF values in sr⁻¹, for use in a notebook or a simulation.
+
+    Args:
+        theta_i: Zenith angles of incidence, (n,).
+        theta_o: Zenith angles of reflection, (n,); with the default phi, positive = mirror side.
+        value: BRDF, (n,) or (n, c).
+        phi: Relative azimuth φ_o − φ_i, (n,) or one number; π is the mirror side.
+        phi_i: Azimuth of incidence, (n,) or one number; of consequence for anisotropic and tilted samples only.
+        sigma: Standard deviation of the noise, shape of `value`.
+        channels: Names of the c columns.
+        source: Title for messages.
+        instrument: What took them.
+
+    Raises:
+        ReadError: lengths differ.
+
+    Example:
+        >>> from_arrays([0.5, 0.5], [-0.5, 0.5], [0.1, 0.3]).n_samples
+        2
+    """
+    given = (np.asarray(a, float) for a in (theta_i, theta_o, phi, phi_i))
+    theta_i, theta_o, phi, phi_i = np.broadcast_arrays(*given)
+    value = np.atleast_2d(np.asarray(value, float).T).T
+    if theta_i.ndim != 1 or len(value) != len(theta_i):
+        raise ReadError(f"{source}: {len(value)} values for angles of shape {theta_i.shape}: expected (n,) each.")
+    if sigma is not None:
+        sigma = np.broadcast_to(np.atleast_2d(np.asarray(sigma, float).T).T, value.shape)
+    channels = channels or default_channels(value.shape[1])
+    placed = np.isfinite(theta_i) & np.isfinite(theta_o) & np.isfinite(phi) & np.isfinite(phi_i)
+    theta_i, theta_o, phi, phi_i = (np.where(placed, angle, 0.0) for angle in (theta_i, theta_o, phi, phi_i))
+    phi_o = phi_i + phi + np.where(theta_o < 0, np.pi, 0.0)
+    wi, wo = from_angles(theta_i, phi_i), from_angles(np.abs(theta_o), phi_o)
+    valid = np.isfinite(value) & (placed & (wi[:, 2] > 0) & (wo[:, 2] > 0))[:, None]
+    if sigma is not None:
+        valid = valid & np.isfinite(sigma) & (sigma > 0)
+    masked = {"not finite, no positive sigma, or below the horizon": int((~valid.all(1)).sum())}
+    return Measurements(
+        wi=wi,
+        wo=wo,
+        value=np.where(valid, value, 0.0),
+        sigma=sigma,
+        valid=valid,
+        channels=channels,
+        source=source,
+        masked={reason: count for reason, count in masked.items() if count},
+        instrument=instrument,
+    )
+
+
+def default_channels(count: int) -> tuple[str, ...]:
+    """Names for unnamed channels: "value", or r, g, b, or 1 … c."""
+    known = {1: ("value",), 3: ("r", "g", "b")}
+    return known.get(count, tuple(str(k + 1) for k in range(count)))

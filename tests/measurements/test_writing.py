@@ -1,0 +1,284 @@
+"""Writing: what is written is read back, by fitmat and by others, and no file of the user's is lost on the way."""
+
+import csv
+import errno
+import io
+import os
+import struct
+import sys
+import types
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from fitmat.errors import OutputError, ReadError
+from fitmat.files import write_bytes, write_text
+from fitmat.measurements import options, writing
+from fitmat.measurements.formats import parquet
+from fitmat.measurements.parsing import tabular
+from fitmat.measurements.reader import measured as finished
+from fitmat.measurements.reader import read
+from fitmat.measurements.samples import Measurements, from_arrays
+from fitmat.measurements.writing import write
+
+SEVEN_DIGITS = 5.1e-7
+"""Relative: half a unit of the seventh digit, where the first is 1."""
+
+ANGLE = 1e-8
+"""Radians: CSV angles are rounded to 10⁻⁶ degrees, which is 1.7e-8 radians."""
+
+EXACT = 1e-15
+"""Degrees and back to radians, and the sine and cosine of them, in float64."""
+
+
+def scattered(rows: int = 60) -> Measurements:
+    """Measurements out of plane, over nine decades, with σ and masked values."""
+    rng = np.random.default_rng(1)
+    value = 10 ** rng.uniform(-5, 4, (rows, 3))
+    value[rng.random((rows, 3)) < 0.1] = np.nan
+    theta_i, theta_o = rng.uniform(0, 1.5, rows), rng.uniform(0.1, 1.5, rows)
+    phi, phi_i = rng.uniform(0, np.pi, rows), rng.uniform(0, 2 * np.pi, rows)
+    return from_arrays(theta_i, theta_o, value, phi=phi, phi_i=phi_i, sigma=0.02 * np.abs(value))
+
+
+def in_plane() -> Measurements:
+    """One channel along the plane of incidence, without σ, one of 30 values masked."""
+    theta_i, theta_o = (a.ravel() for a in np.meshgrid([0.2, 1.0], np.linspace(-1.4, 1.4, 15), indexing="ij"))
+    value = 0.1 + np.cos(theta_i - theta_o) ** 50
+    value[7] = np.nan
+    return from_arrays(theta_i, theta_o, value)
+
+
+def from_parquet(path: Path) -> Measurements:
+    """The table of a Parquet file, read as `read` reads a table."""
+    choices = options.Options()
+    return finished(tabular.recording(parquet.load(path), None, choices), choices)
+
+
+# --- round trips ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("make", [scattered, in_plane])
+def test_csv_comes_back_to_seven_digits(tmp_path, make):
+    there = make()
+    back = read(write(there, tmp_path / "table.csv"))
+    assert back.channels == there.channels
+    assert np.array_equal(back.valid, there.valid)
+    assert back.value[there.valid] == pytest.approx(there.value[there.valid], rel=SEVEN_DIGITS)
+    assert (back.sigma is None) == (there.sigma is None)
+    if back.sigma is not None and there.sigma is not None:
+        assert back.sigma[there.valid] == pytest.approx(there.sigma[there.valid], rel=SEVEN_DIGITS)
+    assert back.wi == pytest.approx(there.wi, abs=ANGLE)
+    assert back.wo == pytest.approx(there.wo, abs=ANGLE)
+
+
+@pytest.mark.parametrize("make", [scattered, in_plane])
+def test_parquet_comes_back_exactly(tmp_path, make):
+    there = make()
+    path = write(there, tmp_path / "table.parquet")
+    back = from_parquet(path)
+    assert back.channels == there.channels
+    assert np.array_equal(back.valid, there.valid)
+    assert np.array_equal(back.value, there.value)
+    if back.sigma is not None and there.sigma is not None:
+        assert np.array_equal(back.sigma[there.valid], there.sigma[there.valid])
+    assert back.wi == pytest.approx(there.wi, abs=EXACT)
+    assert back.wo == pytest.approx(there.wo, abs=EXACT)
+
+
+def test_parquet_and_csv_hold_the_same_columns(tmp_path):
+    """Readers: Python's csv module and polars' read_parquet, which know nothing of fitmat."""
+    there = scattered()
+    with write(there, tmp_path / "table.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    frame = pl.read_parquet(write(there, tmp_path / "table.parquet"))
+    assert list(rows[0]) == frame.columns == ["theta_i", "theta_o", "phi_i", "phi_o", *VALUES]
+    assert set(frame.dtypes) == {pl.Float64}
+    for name in frame.columns:
+        text = np.array([float(row[name]) for row in rows])
+        rounding = 5.1e-7 if name.startswith(("theta", "phi")) else 0
+        assert text == pytest.approx(frame[name].to_numpy(), rel=SEVEN_DIGITS, abs=rounding, nan_ok=True)
+
+
+VALUES = ("brdf_r", "brdf_g", "brdf_b", "sigma_r", "sigma_g", "sigma_b")
+
+
+# --- Parquet of others ----------------------------------------------------------------------------
+
+
+def pack(**columns: object) -> bytes:
+    buffer = io.BytesIO()
+    pl.DataFrame(columns).write_parquet(buffer)
+    return buffer.getvalue()
+
+
+def sample(rng: np.random.Generator) -> bytes:
+    """A valid file of a few rows."""
+    angles = {"theta_i": rng.uniform(5, 80, 20), "theta_o": rng.uniform(5, 80, 20)}
+    return pack(**angles, brdf=rng.uniform(0.1, 1, 20), note=["a", "b"] * 10)
+
+
+def mutated(raw: bytes, rng: np.random.Generator) -> bytes:
+    """The file with one to three faults: flipped bits, numbers of the footer replaced, bytes cut off, lost or added."""
+    content = bytearray(raw)
+    for _ in range(rng.integers(1, 4)):
+        place = int(rng.integers(4, max(len(content), 5)))
+        match rng.integers(5):
+            case 0 if place < len(content):
+                content[place] ^= 1 << int(rng.integers(8))
+            case 1:
+                content[place : place + 4] = struct.pack("<i", [0, -1, 2**31 - 1, len(raw)][rng.integers(4)])
+            case 2:
+                del content[place:]
+            case 3:
+                del content[place : place + int(rng.integers(1, 30))]
+            case _:
+                content[place:place] = rng.bytes(int(rng.integers(1, 30)))
+    return bytes(content)
+
+
+def test_cells_of_every_plain_kind_are_read(tmp_path):
+    path = tmp_path / "kinds.parquet"
+    columns = {
+        "theta_i": [30, 30, None],
+        "theta_o": pl.Series([10.0, None, 20.0], dtype=pl.Float32),
+        "brdf": ["0.5", "0,25", None],
+        "valid": [True, False, None],
+        "when": pl.Series(["2026-01-01"] * 3).str.to_date(),
+        "lasted": pl.Series([1, 2, 3]).cast(pl.Duration),
+        "kind": pl.Series(["a", None, "a"], dtype=pl.Categorical),
+        "spectrum": [[1.0, 2.0], [3.0], []],
+        "bytes": [b"1", b"2", b"3"],
+        "void": pl.Series([None, None, None]),
+    }
+    path.write_bytes(pack(**columns))
+    table = parquet.load(path)
+    assert table.names == ("theta_i", "theta_o", "brdf", "valid", "when", "kind", "void")
+    assert table.notes == ("Columns that hold no plain cells, not read: lasted, spectrum, bytes.",)
+    assert table.numbers(0) == pytest.approx([30, 30, np.nan], nan_ok=True)
+    assert table.numbers(1) == pytest.approx([10, np.nan, 20], nan_ok=True)
+    assert table.numbers(2) == pytest.approx([0.5, 0.25, np.nan], nan_ok=True)
+    assert table.truths(3) == pytest.approx([1, 0, np.nan], nan_ok=True)
+    assert table.words(5).tolist() == ["a", "", "a"]
+    assert table.where(2) == "kinds.parquet row 3"
+
+
+def test_parquet_is_claimed_by_its_magic():
+    raw = sample(np.random.default_rng(1))
+    assert parquet.claims(raw[:65536], len(raw))
+    assert not any(parquet.claims(other, len(other)) for other in [b"", b"PAR1", b"theta_i,theta_o,brdf\n", raw[1:]])
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"PAR1" + bytes(50), "its Parquet content cannot be read .* Was its download cut off"),
+        (sample(np.random.default_rng(1))[:-9], "its Parquet content cannot be read"),
+        (pack(theta_i=[], brdf=[]), "no rows of plain cells, expected at least one"),
+        (pack(spectrum=[[1.0], [2.0]]), "no rows of plain cells, expected at least one"),
+        (pack(theta_i=np.zeros(5_000_000), brdf=np.zeros(5_000_000)), r"\d+ bytes that unpack to 80000000, expected"),
+        (pack(note=["a" * 100_000] * 1000), r"\d+ bytes that unpack to 100000000, expected at most 16777216"),
+    ],
+    ids=["zeros", "cut off", "no rows", "only lists", "swelling", "swelling text"],
+)
+def test_bad_parquet_is_refused(tmp_path, content, message):
+    path = tmp_path / "bad.parquet"
+    path.write_bytes(content)
+    with pytest.raises(ReadError, match=rf"bad\.parquet: {message}"):
+        parquet.load(path)
+
+
+def test_no_fault_of_parquet_raises_anything_but_a_read_error(tmp_path):
+    rng, path = np.random.default_rng(2), tmp_path / "fuzz.parquet"
+    outcomes = {"read": 0, "refused": 0}
+    for _ in range(300):
+        path.write_bytes(mutated(sample(rng), rng))
+        try:
+            assert parquet.load(path).cells.height > 0
+            outcomes["read"] += 1
+        except ReadError:
+            outcomes["refused"] += 1
+    assert min(outcomes.values()) > 10
+
+
+# --- files of the user ----------------------------------------------------------------------------
+
+
+def test_an_existing_file_is_replaced_by_force_only(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("mine")
+    with pytest.raises(OutputError, match=r"table\.csv: already exists; .* or --force \(force=True\) to replace it"):
+        write(in_plane(), path)
+    assert path.read_text() == "mine"
+    assert write(in_plane(), path, force=True) == path
+    assert read(path).n_valid == 29
+    assert [item.name for item in tmp_path.iterdir()] == ["table.csv"]
+
+
+def test_a_link_counts_as_a_file_even_where_it_leads_nowhere(tmp_path):
+    link = tmp_path / "link.csv"
+    link.symlink_to(tmp_path / "nowhere")
+    with pytest.raises(OutputError, match="already exists"):
+        write(in_plane(), link)
+    assert link.is_symlink()
+
+
+@pytest.mark.parametrize("step", ["write_bytes", "replace"])
+def test_a_full_disk_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch, step):
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    path = tmp_path / "table.csv"
+    path.write_text("mine")
+    (tmp_path / "table.csv.part").write_text("mine too")
+    monkeypatch.setattr(os if step == "replace" else Path, step, refuse)
+    with pytest.raises(OutputError, match=r"table\.csv: cannot be written \(No space left on device\); choose another"):
+        write(in_plane(), path, force=True)
+    assert {item.name: item.read_text() for item in tmp_path.iterdir()} == {
+        "table.csv": "mine",
+        "table.csv.part": "mine too",
+    }
+
+
+def test_impossible_places_are_refused(tmp_path):
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "folder.csv").mkdir()
+    for path in (tmp_path / "file" / "a.csv", tmp_path / "a\0.csv", tmp_path / f"{'a' * 300}.csv"):
+        with pytest.raises(OutputError, match="cannot be written"):
+            write(in_plane(), path)
+    with pytest.raises(OutputError, match=r"folder\.csv: cannot be written \(Is a directory\)"):
+        write(in_plane(), tmp_path / "folder.csv", force=True)
+    assert sorted(item.name for item in tmp_path.iterdir()) == ["file", "folder.csv"]
+
+
+def test_a_folder_is_made_and_text_and_bytes_are_written_as_they_are(tmp_path):
+    path = tmp_path / "a" / "b" / "c.txt"
+    assert write_text(path, "θ\r\n").read_bytes() == "θ\r\n".encode()
+    assert write_bytes(path, b"\0\n").read_bytes() == b"\0\n"
+    ordinary = tmp_path / "ordinary"
+    ordinary.write_bytes(b"")
+    assert path.stat().st_mode == ordinary.stat().st_mode
+
+
+@pytest.mark.parametrize("name", ["table", "table.xlsx", "table.csv.gz"])
+def test_an_unknown_suffix_is_refused(tmp_path, name):
+    with pytest.raises(OutputError, match=r"expected \.csv, \.parquet, \.binary, \.bsdf, \.alta"):
+        write(in_plane(), tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_suffix_may_be_in_capitals(tmp_path):
+    assert read(write(in_plane(), tmp_path / "TABLE.CSV")).n_valid == 29
+
+
+@pytest.mark.parametrize("suffix", [".bsdf", ".alta"])
+def test_text_of_a_format_is_written_and_what_it_loses_is_warned_of(tmp_path, monkeypatch, suffix):
+    room = types.ModuleType("room")
+    vars(room).update(dump=lambda m: f"{m.n_samples} θ\n", losses=lambda m: ("No sigma.", "No hue."))
+    monkeypatch.setitem(sys.modules, f"fitmat.formats.{writing.FORMATS[suffix]}", room)
+    with pytest.warns(UserWarning, match=rf"^table\{suffix}: No sigma\. No hue\.$") as caught:
+        path = write(in_plane(), tmp_path / f"table{suffix}")
+    assert path.read_text(encoding="utf-8") == "30 θ\n"
+    assert caught[0].filename == __file__
