@@ -2,7 +2,7 @@
 
 Each pair is simulated as an instrument would see it (in the plane of incidence, 2 % + 1e-3 sr⁻¹ noise) and fitted by
 the other model with `fitmat.fit`; the closed formula n = 2/α² − 2 stands beside what is found. What is left is smooth
-in ln α, so that a cubic describes it, and the script checks that `fitmat.conversion` holds its coefficients. The
+in ln α, so that a cubic describes it, and the script checks that `fitmat.models.conversion` holds its coefficients. The
 settings show what the relation owes to the incidences measured, to the diffuse part and to the index.
 
 Run: python benchmarks/conversion.py [--seeds 3] [--figure FILE.png]
@@ -20,8 +20,8 @@ from matplotlib.figure import Figure
 from tables import replace_between, to_markdown
 
 import fitmat as fm
-from fitmat.brdf import AbstractBRDF
-from fitmat.conversion import (
+from fitmat.models.base import AbstractBRDF
+from fitmat.models.conversion import (
     ALPHA_CORRECTION,
     EXPONENT_CORRECTION,
     alpha_from_exponent,

@@ -23,7 +23,7 @@ from fitmat.likelihood import Data, first_discrepancy, prepare
 from fitmat.maths.least_squares import Minimum
 from fitmat.measurements.noise import measured_noise
 from fitmat.measurements.samples import Measurements
-from fitmat.params import space, vector
+from fitmat.models.parameters import space, vector
 
 TRUTH = {"kd": 0.3, "ks": 1.0, "alpha": 0.2, "eta": 1.5}
 START = {"kd": 0.45, "ks": 0.7, "alpha": 0.28, "eta": 1.9}

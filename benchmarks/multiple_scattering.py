@@ -20,17 +20,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fitmat.brdf import AbstractBRDF, evaluate
-from fitmat.brdf.kulla_conty import KullaConty
-from fitmat.brdf.microfacet import Microfacet
-from fitmat.energy import directional_albedo
-from fitmat.fresnel import AbstractFresnel, Conductor, White
 from fitmat.maths.directions import from_angles
 from fitmat.maths.quadrature import lobe_rule
-from fitmat.microfacet import GGX, Isotropic
-from fitmat.microsurface import Surface
-from fitmat.slab import evaluate_slab
-from fitmat.walk import albedo_walk, evaluate_walk
+from fitmat.models.albedo import directional_albedo
+from fitmat.models.base import AbstractBRDF, evaluate
+from fitmat.models.lobes.kulla_conty import KullaConty
+from fitmat.models.lobes.microfacet import Microfacet
+from fitmat.models.multiple_scattering.position_free import evaluate_slab
+from fitmat.models.multiple_scattering.random_walk import albedo_walk, evaluate_walk
+from fitmat.models.multiple_scattering.surface import Surface
+from fitmat.models.terms.distributions import GGX, Isotropic
+from fitmat.models.terms.fresnel import AbstractFresnel, Conductor, White
 
 PAIRS = ((10, 30, 180), (45, 45, 180), (60, 20, 90), (75, 75, 180), (75, 60, 40))
 """theta_i, theta_o, phi in degrees."""

@@ -1,6 +1,4 @@
 from .approximation import laplace as laplace
-from .brdf import evaluate as evaluate
-from .brdf import model as model
 from .calibration import Calibration as Calibration
 from .calibration import calibrate as calibrate
 from .candidates import Limits as Limits
@@ -9,12 +7,8 @@ from .choice import choose as choose
 from .choice import every_model as every_model
 from .comparison import Comparison as Comparison
 from .comparison import compare as compare
-from .conversion import alpha_from_exponent as alpha_from_exponent
-from .conversion import exponent_from_alpha as exponent_from_alpha
 from .design import Design as Design
 from .design import next_angles as next_angles
-from .energy import directional_albedo as directional_albedo
-from .energy import hemispherical_albedo as hemispherical_albedo
 from .errors import FitmatError as FitmatError
 from .examination import Examination as Examination
 from .examination import examine as examine
@@ -28,7 +22,17 @@ from .measurements.reader import read as read
 from .measurements.samples import Measurements as Measurements
 from .measurements.samples import from_arrays as from_arrays
 from .measurements.writing import write as write
-from .microsurface import Surface as Surface
+from .models.albedo import directional_albedo as directional_albedo
+from .models.albedo import hemispherical_albedo as hemispherical_albedo
+from .models.base import evaluate as evaluate
+from .models.conversion import alpha_from_exponent as alpha_from_exponent
+from .models.conversion import exponent_from_alpha as exponent_from_alpha
+from .models.multiple_scattering.position_free import evaluate_slab as evaluate_slab
+from .models.multiple_scattering.random_walk import albedo_walk as albedo_walk
+from .models.multiple_scattering.random_walk import evaluate_walk as evaluate_walk
+from .models.multiple_scattering.surface import Surface as Surface
+from .models.registry import model as model
+from .models.simulation import simulate as simulate
 from .nuts import check_posterior as check_posterior
 from .outcome import Fit as Fit
 from .plots import plot_ablation as plot_ablation
@@ -44,8 +48,4 @@ from .plots import plot_spheres as plot_spheres
 from .posterior import Posterior as Posterior
 from .prediction import sections as sections
 from .predictive_check import check_predictions as check_predictions
-from .slab import evaluate_slab as evaluate_slab
-from .synthetic import simulate as simulate
 from .uncertainty import sample as sample
-from .walk import albedo_walk as albedo_walk
-from .walk import evaluate_walk as evaluate_walk

@@ -15,18 +15,18 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat._types import Scalar, Spectrum, Vec3
-from fitmat.brdf import AbstractBRDF, surface
-from fitmat.brdf.base import Sum
-from fitmat.brdf.cook_torrance import CookTorrance
-from fitmat.brdf.microfacet import Microfacet
-from fitmat.brdf.walter import Walter
-from fitmat.conversion import exponent_from_alpha
 from fitmat.distances import ANGLES, AZIMUTHS, Values
 from fitmat.estimate import Estimate, band, estimate
-from fitmat.fresnel import AbstractFresnel
 from fitmat.maths.quadrature import lobe_rule
-from fitmat.microfacet import AbstractDistribution, Beckmann, Slopes
-from fitmat.params import with_vector
+from fitmat.models.around.instrument import surface
+from fitmat.models.base import AbstractBRDF, Sum
+from fitmat.models.conversion import exponent_from_alpha
+from fitmat.models.lobes.cook_torrance import CookTorrance
+from fitmat.models.lobes.microfacet import Microfacet
+from fitmat.models.lobes.walter import Walter
+from fitmat.models.parameters import with_vector
+from fitmat.models.terms.distributions import AbstractDistribution, Beckmann, Slopes
+from fitmat.models.terms.fresnel import AbstractFresnel
 from fitmat.regions import GRAZING_DEG
 
 TERMS = {

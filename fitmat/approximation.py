@@ -18,8 +18,8 @@ from fitmat.density import default_walkers, log_posterior, physical
 from fitmat.information import inverse_information
 from fitmat.likelihood import noise_scale
 from fitmat.measurements.samples import Measurements
+from fitmat.models.parameters import space
 from fitmat.outcome import Fit
-from fitmat.params import space
 from fitmat.posterior import GOOD_PARETO, Posterior
 
 LAPLACE_DRAWS = 2000

@@ -14,13 +14,13 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from fitmat import fitting
-from fitmat.brdf import AbstractBRDF
 from fitmat.information import FOLLOWS, covariance, expected_information, is_positive, observed_information
 from fitmat.likelihood import NEGLIGIBLE, Data, noise_scale
 from fitmat.measurements.large.noise import Scatter, scatter
 from fitmat.measurements.large.stream import Progress, Rows
+from fitmat.models.base import AbstractBRDF
+from fitmat.models.parameters import space, vector, with_vector
 from fitmat.outcome import Fit, named_outcome
-from fitmat.params import space, vector, with_vector
 from fitmat.sums import Sums, block_sums, blocks, prior_sums
 
 T = TypeVar("T")

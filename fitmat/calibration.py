@@ -18,14 +18,15 @@ from jaxtyping import Array, ArrayLike, Bool, Float, Int
 from scipy.stats import binomtest
 
 from fitmat.approximation import laplace
-from fitmat.brdf import AbstractBRDF, evaluate, evaluate_pairs, model
 from fitmat.errors import FitmatError
 from fitmat.fitting import fit
 from fitmat.likelihood import Data, log_likelihood, mapped
 from fitmat.measurements.instrument import IDEAL
 from fitmat.measurements.samples import Measurements
+from fitmat.models.base import AbstractBRDF, evaluate, evaluate_pairs
+from fitmat.models.parameters import entries, vector, with_vector
+from fitmat.models.registry import model
 from fitmat.outcome import free_places
-from fitmat.params import entries, vector, with_vector
 from fitmat.posterior import Posterior
 from fitmat.priors import DISCREPANCY, draw, prepared
 from fitmat.stabilising import from_stabilised, stabilised

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fitmat.brdf import LOBES
 from fitmat.crossvalidation import LeftOut, leave_incidences_out
 from fitmat.errors import FitmatError
 from fitmat.evidence import Evidence, weigh
 from fitmat.measurements.samples import Measurements
+from fitmat.models.registry import LOBES
 from fitmat.outcome import Fit
 from fitmat.plausibility import broken_laws, doubts
 from fitmat.posterior import Posterior

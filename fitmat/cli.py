@@ -80,7 +80,7 @@ def fit(
     _setup()
     from fitmat import conditions, console, files, priors, report, screen
     from fitmat.measurements.samples import Measurements
-    from fitmat.params import assignments
+    from fitmat.models.parameters import assignments
 
     fixed, believed = assignments(fix or [], "--fix"), priors.assignments(prior or [])
     measurements = console.source(file, reading | {"instrument": instrument})
@@ -233,7 +233,7 @@ def design(
     _setup()
     from fitmat import console, planning
     from fitmat.measurements.reader import read
-    from fitmat.params import assignments
+    from fitmat.models.parameters import assignments
 
     measurements = read(file, **reading, instrument=instrument)
     known = {name: {} for name in console.model_names(models, measurements)}

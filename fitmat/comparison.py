@@ -14,8 +14,6 @@ from jaxtyping import Float
 
 from fitmat import headline
 from fitmat.ablation import Ablation, ablate
-from fitmat.brdf import LOBES, lobe_names
-from fitmat.conversion import alpha_from_exponent, exponent_from_alpha
 from fitmat.distances import ANGLES, Distances, Values, measure_distances
 from fitmat.errors import FitmatError
 from fitmat.estimate import Estimate, band, estimate
@@ -24,6 +22,8 @@ from fitmat.headline import SIMILAR as SIMILAR
 from fitmat.headline import STRONG_EVIDENCE as STRONG_EVIDENCE
 from fitmat.imitation import Imitation, imitate
 from fitmat.measurements.samples import Measurements
+from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
+from fitmat.models.registry import LOBES, lobe_names
 from fitmat.outcome import Fit
 from fitmat.posterior import Posterior
 from fitmat.telling import Telling, tell_apart

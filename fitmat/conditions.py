@@ -5,13 +5,12 @@ It fits nothing; it turns "this is gold" and "it may be tilted" into what `fit` 
 
 import numpy as np
 
-from fitmat.brdf import LOBES, lobe_names, model
-from fitmat.brdf.registry import OVER
 from fitmat.errors import ModelError
-from fitmat.fresnel import Dielectric, f0_f82_from_ior
 from fitmat.measurements.samples import IN_PLANE, Measurements
-from fitmat.params import entries
-from fitmat.refraction import channel_wavelengths, index
+from fitmat.models.parameters import entries
+from fitmat.models.refractive_index import channel_wavelengths, index
+from fitmat.models.registry import LOBES, OVER, lobe_names, model
+from fitmat.models.terms.fresnel import Dielectric, f0_f82_from_ior
 
 ABSORBING = 0.01
 """κ from which a material counts as a metal: the lower bound of the parameter."""
@@ -28,7 +27,7 @@ def of_material(name: str, material: str, channels: tuple[str, ...]) -> Known:
 
     Args:
         name: Of the model.
-        material: As in `fitmat.refraction.index`.
+        material: As in `fitmat.models.refractive_index.index`.
         channels: Names of the channels, whose wavelengths count.
 
     Returns:

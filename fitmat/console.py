@@ -18,7 +18,6 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
 
 from fitmat.approximation import laplace, laplace_each
-from fitmat.brdf import LOBES, lobe_names, model, normalised
 from fitmat.bulk import fit_chunks
 from fitmat.choice import every_model
 from fitmat.comparison import Comparison, compare, is_empirical, is_microfacet
@@ -28,8 +27,9 @@ from fitmat.measurements.large import chunks
 from fitmat.measurements.large.stream import Rows, held
 from fitmat.measurements.reader import read
 from fitmat.measurements.samples import Measurements
+from fitmat.models.parameters import entries
+from fitmat.models.registry import LOBES, lobe_names, model, normalised
 from fitmat.outcome import Fit
-from fitmat.params import entries
 from fitmat.posterior import Posterior
 from fitmat.priors import DISCREPANCY
 from fitmat.study import Study, concluded

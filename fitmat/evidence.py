@@ -10,9 +10,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.brdf import AbstractBRDF
 from fitmat.likelihood import Data, log_pointwise, mapped
-from fitmat.params import with_vector
+from fitmat.models.base import AbstractBRDF
+from fitmat.models.parameters import with_vector
 from fitmat.posterior import GOOD_PARETO, Posterior
 
 DRAWS = 1000

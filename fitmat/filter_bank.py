@@ -11,11 +11,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.brdf import AbstractBRDF
 from fitmat.likelihood import mapped
 from fitmat.losses import Loss
+from fitmat.models.base import AbstractBRDF
+from fitmat.models.parameters import space, with_vector
 from fitmat.outcome import Fit
-from fitmat.params import space, with_vector
 from fitmat.profile_likelihood import profiles
 from fitmat.ridge import Ridge, ridge
 

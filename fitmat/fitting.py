@@ -13,7 +13,6 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, ArrayLike
 
-from fitmat.brdf import LEAST_ABSOLUTE, AbstractBRDF, Noisy, Seen, evaluate_pairs, model
 from fitmat.errors import FitmatError, ModelError
 from fitmat.likelihood import (
     Data,
@@ -30,8 +29,12 @@ from fitmat.losses import loss as find_loss
 from fitmat.maths.least_squares import Minimum, Units, least_squares
 from fitmat.measurements.noise import measured_noise
 from fitmat.measurements.samples import Measurements
+from fitmat.models.around.instrument import Seen
+from fitmat.models.around.noise import LEAST_ABSOLUTE, Noisy
+from fitmat.models.base import AbstractBRDF, evaluate_pairs
+from fitmat.models.parameters import Space, check_range, entries, space, vector, with_vector
+from fitmat.models.registry import model
 from fitmat.outcome import Ends, Fit, conclude, free_places
-from fitmat.params import Space, check_range, entries, space, vector, with_vector
 from fitmat.priors import prepared
 from fitmat.starts import starting_points
 

@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.information import UNDETERMINED
+from fitmat.models.parameters import space
 from fitmat.outcome import Fit
-from fitmat.params import space
 from fitmat.posterior import Posterior
 from fitmat.priors import natural_sd
 from fitmat.profile_likelihood import Profile, profiles

@@ -14,16 +14,18 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, ArrayLike, Float
 
-from fitmat.brdf import AbstractBRDF, evaluate_pairs, model, surface
-from fitmat.conversion import exponent_from_alpha
 from fitmat.distances import AZIMUTHS, METRICS, direction_weight, incidence_weight
 from fitmat.errors import FitmatError
 from fitmat.fitting import STEADY, Chart
 from fitmat.likelihood import mapped
 from fitmat.maths.least_squares import least_squares
 from fitmat.maths.quadrature import Rule, lobe_rule
+from fitmat.models.around.instrument import surface
+from fitmat.models.base import AbstractBRDF, evaluate_pairs
+from fitmat.models.conversion import exponent_from_alpha
+from fitmat.models.parameters import check_range, entries, space, vector, with_vector
+from fitmat.models.registry import model
 from fitmat.outcome import Fit, free_places
-from fitmat.params import check_range, entries, space, vector, with_vector
 from fitmat.regions import incidence_panels
 from fitmat.starts import nonnegative
 

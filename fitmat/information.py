@@ -11,9 +11,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.brdf import AbstractBRDF
 from fitmat.likelihood import Data, every_residual, noise_scale, residuals
-from fitmat.params import entries, space, vector, with_vector
+from fitmat.models.base import AbstractBRDF
+from fitmat.models.parameters import entries, space, vector, with_vector
 
 UNDETERMINED = {"log": 1.0, "linear": 0.3}
 """A parameter whose standard deviation exceeds this (in ln p, or as a fraction of its range) is not determined."""

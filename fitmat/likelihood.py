@@ -18,11 +18,12 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat._types import Directions, Samples, Scalar
-from fitmat.brdf import AbstractBRDF, Noisy, evaluate_pairs, padded_length
 from fitmat.losses import DEFAULT, Loss
 from fitmat.measurements.noise import Noise, levels
 from fitmat.measurements.samples import Measurements
-from fitmat.params import space, vector
+from fitmat.models.around.noise import Noisy
+from fitmat.models.base import AbstractBRDF, evaluate_pairs, padded_length
+from fitmat.models.parameters import space, vector
 from fitmat.stabilising import spread
 
 

@@ -11,9 +11,9 @@ from rich.progress import track
 from rich.table import Table
 from rich.text import Text
 
-from fitmat import laws
-from fitmat.brdf import LOBES, lobe_names, model
 from fitmat.losses import LOSSES
+from fitmat.models import laws
+from fitmat.models.registry import LOBES, lobe_names, model
 
 FRESNEL = "fresnel"
 """The page that compares the Fresnel terms."""
@@ -139,7 +139,7 @@ def _verdict(law: str, finding: laws.Finding, declared: bool) -> Text:
 
 def fresnel_terms() -> None:
     """Print how far Schlick's, Hoffman's and Belcour's Fresnel terms are from the exact equations."""
-    from fitmat.fresnel_basis import error_table
+    from fitmat.models.terms.belcour import error_table
 
     errors: dict[str, list[str]] = {}
     names: list[str] = []

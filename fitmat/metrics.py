@@ -5,8 +5,8 @@ Compares no models with each other; `comparison` does.
 
 import numpy as np
 
-from fitmat.brdf import evaluate
 from fitmat.measurements.samples import Measurements
+from fitmat.models.base import evaluate
 from fitmat.outcome import Fit
 
 

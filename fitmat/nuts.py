@@ -18,8 +18,8 @@ from fitmat.approximation import draws
 from fitmat.density import log_density_at, physical
 from fitmat.errors import FitmatError
 from fitmat.likelihood import mapped
+from fitmat.models.parameters import space
 from fitmat.outcome import Fit
-from fitmat.params import space
 from fitmat.posterior import ENOUGH_ESS, GOOD_RHAT, Posterior
 from fitmat.text import html_table, text_table
 

@@ -13,13 +13,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.brdf import AbstractBRDF, evaluate_pairs
 from fitmat.information import FOLLOWS, MISSES, covariance, information
 from fitmat.likelihood import Data, best_discrepancy, first_discrepancy, noise_scale
 from fitmat.losses import DEFAULT, Loss
 from fitmat.measurements.noise import Noise
 from fitmat.measurements.samples import Measurements
-from fitmat.params import Entry, entries, space, vector, with_vector
+from fitmat.models.base import AbstractBRDF, evaluate_pairs
+from fitmat.models.parameters import Entry, entries, space, vector, with_vector
 from fitmat.text import html_table, text_table, with_error
 
 AGREE = 0.1

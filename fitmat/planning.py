@@ -16,7 +16,7 @@ from fitmat.comparison import is_microfacet
 from fitmat.design import MATCH, Design, Proposal, next_angles
 from fitmat.errors import OutputError
 from fitmat.files import write_bytes
-from fitmat.params import space
+from fitmat.models.parameters import space
 from fitmat.posterior import Posterior
 from fitmat.text import plain, text_table
 

@@ -12,13 +12,13 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.special import ndtri
 
-from fitmat.brdf import AbstractBRDF, evaluate, evaluate_pairs
 from fitmat.likelihood import Data, prepare, residuals
 from fitmat.losses import DEFAULT
 from fitmat.maths.directions import from_angles
 from fitmat.measurements.samples import Measurements
+from fitmat.models.base import AbstractBRDF, evaluate, evaluate_pairs
+from fitmat.models.parameters import with_vector
 from fitmat.outcome import Fit
-from fitmat.params import with_vector
 from fitmat.posterior import Posterior
 from fitmat.stabilising import from_stabilised, stabilised
 

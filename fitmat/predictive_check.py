@@ -11,12 +11,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from fitmat.brdf import AbstractBRDF, evaluate_pairs
 from fitmat.errors import FitmatError
 from fitmat.likelihood import Data, inferred_noise, mapped
 from fitmat.losses import DEFAULT
 from fitmat.measurements.incidences import incidences
-from fitmat.params import with_vector
+from fitmat.models.base import AbstractBRDF, evaluate_pairs
+from fitmat.models.parameters import with_vector
 from fitmat.posterior import Posterior
 from fitmat.predictive_statistics import Look, Statistic
 from fitmat.text import html_table, text_table

@@ -14,11 +14,11 @@ import numpy as np
 from jaxtyping import ArrayLike, Float
 from scipy.stats import truncnorm
 
-from fitmat.brdf import AbstractBRDF
 from fitmat.errors import ModelError
 from fitmat.likelihood import Prior
 from fitmat.measurements.instrument import Instrument
-from fitmat.params import Entry, entries, space, vector
+from fitmat.models.base import AbstractBRDF
+from fitmat.models.parameters import Entry, entries, space, vector
 from fitmat.text import with_error
 
 DISCREPANCY = "discrepancy"

@@ -26,8 +26,8 @@ from fitmat.distances import METRICS
 from fitmat.headline import CLOSE, SIMILAR
 from fitmat.measurements.samples import Measurements
 from fitmat.metrics import fit_metrics
+from fitmat.models.parameters import space
 from fitmat.outcome import RESULTS, Fit
-from fitmat.params import space
 from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS, Posterior
 from fitmat.prediction import sections
 from fitmat.regions import GRAZING_DEG, REGIONS

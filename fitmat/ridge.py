@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import PchipInterpolator
 
+from fitmat.models.parameters import space
 from fitmat.outcome import Fit
-from fitmat.params import space
 from fitmat.priors import natural_sd
 from fitmat.profile_likelihood import STEPS, Profile, along
 

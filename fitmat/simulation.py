@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from fitmat import catalogue, synthetic
-from fitmat.brdf import AbstractBRDF, model
 from fitmat.errors import ModelError, OutputError
 from fitmat.files import write_text
 from fitmat.measurements.formats import csv
 from fitmat.measurements.instrument import Instrument
-from fitmat.params import assignments
+from fitmat.models import catalogue, simulation
+from fitmat.models.base import AbstractBRDF
+from fitmat.models.parameters import assignments
+from fitmat.models.registry import model
 
 MOST_ANGLES = 10_000
 """More angles than this on one axis are a slip of the keyboard."""
@@ -88,7 +89,7 @@ def write_simulation(
     _refuse_existing([path], force)
     theta_i, theta_o, phi, phi_i = (np.deg2rad(part) for part in geometry)
     relative, absolute, seed = noise
-    measured = synthetic.simulate(
+    measured = simulation.simulate(
         material,
         theta_i,
         theta_o,

@@ -17,11 +17,12 @@ from jaxtyping import Array, Float
 from scipy.ndimage import map_coordinates
 
 from fitmat import scene
-from fitmat.brdf import AbstractBRDF, evaluate_pairs, surface
 from fitmat.estimate import Estimate, estimate
 from fitmat.likelihood import mapped
 from fitmat.maths.directions import zenith
-from fitmat.params import with_vector
+from fitmat.models.around.instrument import surface
+from fitmat.models.base import AbstractBRDF, evaluate_pairs
+from fitmat.models.parameters import with_vector
 from fitmat.scene import Screen
 from fitmat.spectra import colouring, delta_e_2000, delta_e_itp, shown, to_srgb
 
@@ -135,7 +136,7 @@ def perceived(
 
     Example:
         >>> import fitmat as fm
-        >>> from fitmat.params import vector
+        >>> from fitmat.models.parameters import vector
         >>> one, other = fm.model("lambert+phong", kd=0.3), fm.model("lambert+ggx", kd=0.3)
         >>> found = perceived(one, other, (vector(one)[None], vector(other)[None]), ("value",))
         >>> found.colours

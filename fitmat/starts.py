@@ -11,9 +11,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.brdf import AbstractBRDF, evaluate_pairs
 from fitmat.likelihood import Data
-from fitmat.params import Entry, entries, vector, with_vector
+from fitmat.models.base import AbstractBRDF, evaluate_pairs
+from fitmat.models.parameters import Entry, entries, vector, with_vector
 from fitmat.stabilising import spread, stabilised
 
 MAX_ROWS = 4000

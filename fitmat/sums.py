@@ -12,11 +12,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.brdf import AbstractBRDF
 from fitmat.likelihood import Data, discrepancy_cost, log_likelihood, prepare, prior_residuals, residuals
 from fitmat.measurements.noise import Noise
 from fitmat.measurements.samples import Measurements
-from fitmat.params import space, vector, with_vector
+from fitmat.models.base import AbstractBRDF
+from fitmat.models.parameters import space, vector, with_vector
 
 BLOCK = 2**15
 """Rows for which the program that adds up one block is compiled; its intermediate arrays stay in the cache."""

@@ -10,7 +10,7 @@ from fractions import Fraction
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.fresnel import f0_from_eta, f0_from_ior
+from fitmat.models.terms.fresnel import f0_from_eta, f0_from_ior
 from fitmat.outcome import Fit
 from fitmat.priors import natural_sd
 from fitmat.profile_likelihood import free_names

@@ -66,6 +66,6 @@ def hemisphere() -> Hemisphere:
 @pytest.fixture(scope="session")
 def singular() -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Where formulas of reflection divide by zero or take the root of zero, by name."""
-    from fitmat import laws
+    from fitmat.models import laws
 
     return laws.singular()

@@ -19,8 +19,8 @@ from fitmat.measurements.instrument import Instrument
 from fitmat.measurements.large import chunks, noise
 from fitmat.measurements.large.chunks import Chunks
 from fitmat.measurements.noise import measured_noise
+from fitmat.models.parameters import space, vector, with_vector
 from fitmat.outcome import Fit
-from fitmat.params import space, vector, with_vector
 from fitmat.sums import Sums, block_sums
 
 MODEL = "lambert+blinn-phong"

@@ -11,11 +11,11 @@ from jaxtyping import Array
 from scipy import stats
 
 import fitmat as fm
-from fitmat.brdf.lambert import Lambert
 from fitmat.choice import Candidate, Choice
 from fitmat.crossvalidation import MOST_REFITTED, leave_incidences_out
 from fitmat.errors import FitmatError
 from fitmat.evidence import MOST_LEFT_OUT, Evidence, weigh
+from fitmat.models.lobes.lambert import Lambert
 from fitmat.outcome import Fit
 from fitmat.plausibility import broken_laws, doubts
 from fitmat.posterior import Posterior

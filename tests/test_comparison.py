@@ -12,14 +12,14 @@ from oracles import ggx
 import fitmat as fm
 from fitmat import comparison, headline, plots, sphere
 from fitmat.ablation import EXPLAINS, TERMS, Ablation
-from fitmat.brdf import AbstractBRDF
 from fitmat.comparison import ALBEDO_ANGLES, Comparison, compare
-from fitmat.conversion import alpha_from_exponent, exponent_from_alpha, fitted_alpha, fitted_exponent
 from fitmat.distances import METRICS
 from fitmat.errors import FitmatError
 from fitmat.estimate import Estimate
 from fitmat.imitation import Imitation
 from fitmat.metrics import fit_metrics
+from fitmat.models.base import AbstractBRDF
+from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha, fitted_alpha, fitted_exponent
 from fitmat.outcome import Fit
 from fitmat.posterior import Posterior
 from fitmat.regions import GRAZING_DEG, REGIONS

@@ -6,7 +6,7 @@ import pytest
 import fitmat as fm
 from fitmat.conditions import of_material, prepared, tilted
 from fitmat.errors import ModelError
-from fitmat.synthetic import simulate
+from fitmat.models.simulation import simulate
 
 JOHNSON_CHRISTY = 2e-2
 """Absolute; their table is in steps of 0.12 eV, of which 2.26 eV (548.6 nm) is next to 550 nm."""

@@ -9,9 +9,9 @@ import pytest
 import fitmat
 from fitmat import console, screen
 from fitmat.errors import ModelError
+from fitmat.models.simulation import simulate
 from fitmat.posterior import Posterior
 from fitmat.study import Study
-from fitmat.synthetic import simulate
 
 
 @pytest.fixture(scope="module")

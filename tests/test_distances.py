@@ -9,15 +9,14 @@ from scipy.integrate import dblquad, quad
 
 import fitmat as fm
 from fitmat.ablation import TERMS, Ablation, CosinePower, ablate, ablated
-from fitmat.brdf import AbstractBRDF
-from fitmat.brdf.base import Sum
-from fitmat.brdf.lambert import Lambert
-from fitmat.brdf.microfacet import Microfacet
 from fitmat.distances import ANGLES, METRICS, Distances, measure_distances
 from fitmat.estimate import Estimate
-from fitmat.fresnel import White
-from fitmat.microfacet import GGX, Isotropic
-from fitmat.params import vector
+from fitmat.models.base import AbstractBRDF, Sum
+from fitmat.models.lobes.lambert import Lambert
+from fitmat.models.lobes.microfacet import Microfacet
+from fitmat.models.parameters import vector
+from fitmat.models.terms.distributions import GGX, Isotropic
+from fitmat.models.terms.fresnel import White
 from fitmat.regions import REGIONS
 
 EXACT = 1e-9

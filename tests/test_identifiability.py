@@ -13,8 +13,8 @@ from scipy.optimize import least_squares
 import fitmat as fm
 from fitmat.identifiability import CONTRACTED, STATES, Identifiability, identify
 from fitmat.likelihood import every_residual
+from fitmat.models.parameters import space, with_vector
 from fitmat.outcome import Fit
-from fitmat.params import space, with_vector
 from fitmat.posterior import Posterior
 from fitmat.priors import natural_sd
 from fitmat.profile_likelihood import Profile, profiles

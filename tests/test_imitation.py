@@ -8,7 +8,9 @@ from oracles import ggx
 from scipy.optimize import least_squares
 
 import fitmat as fm
-from fitmat.conversion import (
+from fitmat.errors import FitmatError
+from fitmat.imitation import LEAST_SQUARES, imitate
+from fitmat.models.conversion import (
     ALPHA_CORRECTION,
     EXPONENT_CORRECTION,
     alpha_from_exponent,
@@ -16,8 +18,6 @@ from fitmat.conversion import (
     fitted_alpha,
     fitted_exponent,
 )
-from fitmat.errors import FitmatError
-from fitmat.imitation import LEAST_SQUARES, imitate
 
 SAME = 1e-6
 """Relative; the solver's tolerance is 1e-8 in the steps."""

@@ -12,12 +12,13 @@ from scipy import stats
 from scipy.optimize import curve_fit
 
 import fitmat as fm
-from fitmat.brdf import AbstractBRDF, Noisy, evaluate
 from fitmat.errors import FitmatError, ModelError
 from fitmat.likelihood import Data, log_likelihood, prepare
 from fitmat.losses import BAD_SHARE, BAD_SPREAD, LOSSES, T_DOF, bad_probability, loss
 from fitmat.measurements.noise import measured_noise
-from fitmat.params import vector, with_vector
+from fitmat.models.around.noise import Noisy
+from fitmat.models.base import AbstractBRDF, evaluate
+from fitmat.models.parameters import vector, with_vector
 
 SIX_DIGITS = 1e-6
 """Relative; both solvers are asked for more."""

@@ -3,8 +3,8 @@
 import pytest
 
 from fitmat import manual
-from fitmat.brdf import LOBES
-from fitmat.brdf.phong import BlinnPhong
+from fitmat.models.lobes.phong import BlinnPhong
+from fitmat.models.registry import LOBES
 
 
 @pytest.fixture(autouse=True)

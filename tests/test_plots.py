@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 import fitmat
 from fitmat import console, plots, prediction
 from fitmat.comparison import Comparison, compare
+from fitmat.models.simulation import simulate
 from fitmat.posterior import Posterior
-from fitmat.synthetic import simulate
 
 NAMES = ["lambert+blinn-phong", "lambert+ggx"]
 

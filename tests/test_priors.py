@@ -9,7 +9,7 @@ import fitmat as fm
 from fitmat import priors
 from fitmat.errors import ModelError
 from fitmat.measurements.instrument import IDEAL
-from fitmat.params import entries, space
+from fitmat.models.parameters import entries, space
 
 EXACT = 1e-5
 """Relative; the solver's tolerance and the Gaussian's second order are far below."""

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import fitmat as fm
-from fitmat.brdf import LOBES
-from fitmat.laws import example
+from fitmat.models.laws import example
+from fitmat.models.registry import LOBES
 from fitmat.outcome import Fit
 
 SIGMAS = 3.5

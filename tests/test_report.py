@@ -16,8 +16,8 @@ import pytest
 import fitmat
 from fitmat import console, record, report
 from fitmat.measurements.samples import Measurements
+from fitmat.models.simulation import simulate
 from fitmat.study import Study
-from fitmat.synthetic import simulate
 from fitmat.text import interval, with_error
 
 NAMES = ["lambert+blinn-phong", "lambert+ggx"]

@@ -12,9 +12,9 @@ from oracles import ggx
 
 import fitmat as fm
 from fitmat import plots, scene
-from fitmat.brdf import AbstractBRDF, evaluate_pairs
 from fitmat.estimate import Estimate
-from fitmat.params import vector
+from fitmat.models.base import AbstractBRDF, evaluate_pairs
+from fitmat.models.parameters import vector
 from fitmat.sphere import Perceived, Spread, _spread, perceived
 
 EVEN = 3e-3

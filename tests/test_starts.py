@@ -12,7 +12,7 @@ from scipy.optimize import nnls
 import fitmat as fm
 from fitmat.likelihood import Data, prepare
 from fitmat.measurements.noise import measured_noise
-from fitmat.params import entries
+from fitmat.models.parameters import entries
 from fitmat.starts import nonnegative, starting_points
 
 OBJECTIVE = 1e-3

@@ -12,11 +12,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.brdf import AbstractBRDF, evaluate_pairs, model
 from fitmat.information import UNDETERMINED, inverse_information
 from fitmat.measurements.noise import noise_law
 from fitmat.measurements.samples import Measurements
-from fitmat.params import entries, space, vector, with_vector
+from fitmat.models.base import AbstractBRDF, evaluate_pairs
+from fitmat.models.parameters import entries, space, vector, with_vector
+from fitmat.models.registry import model
 
 ROWS = 2048
 """Rows that are looked at, evenly chosen and weighted up; always as many, so that all files share one program."""

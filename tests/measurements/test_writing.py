@@ -277,7 +277,7 @@ def test_a_suffix_may_be_in_capitals(tmp_path):
 def test_text_of_a_format_is_written_and_what_it_loses_is_warned_of(tmp_path, monkeypatch, suffix):
     room = types.ModuleType("room")
     vars(room).update(dump=lambda m: f"{m.n_samples} θ\n", losses=lambda m: ("No sigma.", "No hue."))
-    monkeypatch.setitem(sys.modules, f"fitmat.formats.{writing.FORMATS[suffix]}", room)
+    monkeypatch.setitem(sys.modules, f"fitmat.measurements.formats.{writing.FORMATS[suffix]}", room)
     with pytest.warns(UserWarning, match=rf"^table\{suffix}: No sigma\. No hue\.$") as caught:
         path = write(in_plane(), tmp_path / f"table{suffix}")
     assert path.read_text(encoding="utf-8") == "30 θ\n"

@@ -11,8 +11,9 @@ import pytest
 
 import fitmat as fm
 from fitmat.errors import ReadError
-from fitmat.measurements.large import chunks
+from fitmat.measurements.large import chunks, tables
 from fitmat.measurements.large.chunks import Chunks
+from fitmat.measurements.parsing import contents
 
 COUNT = 400
 """Rows of a file, some 20 blocks of `SMALL` bytes."""

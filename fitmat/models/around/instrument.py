@@ -1,0 +1,168 @@
+"""Seen: a surface as an instrument shows it, with finite apertures, a shared scale error and a dark signal.
+
+It holds no surface of its own, and no noise.
+"""
+
+import functools
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from fitmat._types import Scalar, Spectrum, Vec3
+from fitmat.maths.directions import COS_MIN, above
+from fitmat.measurements.instrument import Instrument
+from fitmat.models.around.noise import Noisy
+from fitmat.models.around.tilt import Tilted
+from fitmat.models.base import AbstractBRDF
+from fitmat.models.parameters import param
+
+RINGS, SPOKES = 5, 11
+"""Nodes of the cone rule along its radius and around its axis."""
+
+_DENSE = 200
+
+
+class Seen(AbstractBRDF):
+    r"""What an instrument reads of a base: its apertures, its calibration and its dark signal.
+
+    .. math:: f = g \left( \frac{\sum_k w_k f_b(\omega_{i,k}, \omega_{o,k}) c_{i,k} c_{o,k}}
+        {\sum_k w_k c_{i,k} c_{o,k}} + \frac{b}{c_o} \right)
+
+    The sum is the average of the BRDF over the two projected solid angles (Nicodemus et al. 1977, eq. 12), by a fixed
+    rule of 55 nodes (`cone_rule`): a fit costs about 55 times as much as one with an ideal instrument. With apertures
+    of half-angle A and B a lobe of slope α is exact to 0.2 % while A + B ≤ 2 α, to 2 % while A + B ≤ 3 α.
+
+    Parameters: scale g, known to the calibration's standard deviation, where that is not 0; dark signal b in sr⁻¹ where
+    it is not known. Both None where there is nothing to fit.
+
+    Limits: for an ideal instrument the base itself; of a Lambertian base g k_d/π whatever the apertures.
+
+    Reference: F. E. Nicodemus et al., Geometrical considerations and nomenclature for reflectance, NBS 1977.
+    """
+
+    base: AbstractBRDF
+    instrument: Instrument = eqx.field(static=True)
+    scale: Scalar | None = param(
+        1e-4, 1e4, symbol="g", scale="log", optional=True, starts=(1.0,),
+        doc="error of the scale that all values share; 1 where the calibration is right",
+    )  # fmt: skip
+    dark: Scalar | None = param(
+        0.0, 1.0, symbol="b", unit="1/sr", optional=True, starts=(0.0,),
+        doc="dark signal and stray light, as f_r cosθ_o",
+    )  # fmt: skip
+
+    @property
+    def name(self) -> str:
+        """That of the base: the instrument makes no other material of it."""
+        return self.base.name
+
+    def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
+        """The module's formula."""
+        cones = self.instrument.source + self.instrument.receiver > 0
+        shown = self._averaged(wi, wo) if cones else self.base(wi, wo)
+        shown += self._dark / jnp.maximum(wo[2], COS_MIN)
+        return (1.0 if self.scale is None else self.scale) * jnp.where(above(wi, wo), shown, 0.0)
+
+    @property
+    def _dark(self) -> Scalar:
+        return jnp.asarray(self.instrument.dark if self.dark is None else self.dark)
+
+    def _averaged(self, wi: Vec3, wo: Vec3) -> Spectrum:
+        rule = cone_rule(self.instrument.source, self.instrument.receiver)
+        lights, sensors = jnp.asarray(rule[0]) @ _frame(wi), jnp.asarray(rule[1]) @ _frame(wo)
+        product = jnp.asarray(rule[2]) * lights[:, 2] * sensors[:, 2]
+        return product @ jax.vmap(self.base)(lights, sensors) / jnp.maximum(jnp.sum(product), COS_MIN)
+
+    def width(self) -> Scalar:
+        """That of the base."""
+        return self.base.width()
+
+    @property
+    def isotropic(self) -> bool:
+        """Where the base is."""
+        return self.base.isotropic
+
+    def diffuse_albedo(self) -> Spectrum:
+        """That of the base."""
+        return self.base.diffuse_albedo()
+
+
+def surface(model: AbstractBRDF) -> AbstractBRDF:
+    """The material itself: without what the instrument and the mount do to its measurement."""
+    while isinstance(model, Noisy | Seen | Tilted):
+        model = model.base
+    return model
+
+
+def _frame(w: Vec3) -> Float[jax.Array, "3 3"]:
+    """Rows: two tangents and w, the shortest rotation of the axes to w = +z (Duff et al. 2017, JCGT 6(1)).
+
+    The tangents of two mirror directions have the same x and y, so that equal offsets from both turn the half vector
+    the same way.
+    """
+    x, y, z = w
+    a = -1.0 / (1.0 + jnp.maximum(z, 0.0))
+    return jnp.stack([jnp.stack([1.0 + x * x * a, x * y * a, -x]), jnp.stack([x * y * a, 1.0 + y * y * a, -y]), w])
+
+
+@functools.lru_cache
+def cone_rule(
+    source: float, receiver: float
+) -> tuple[Float[np.ndarray, "k 3"], Float[np.ndarray, "k 3"], Float[np.ndarray, " k"]]:
+    """Pairs of directions about two axes +z that average a BRDF over a source's and a receiver's cone.
+
+    A specular lobe depends on the sum c of the two offsets from the axes only (it turns the half vector). c is
+    distributed as the sum of two uniform discs: its density is the area in which discs of radius A and B at distance
+    |c| overlap. The rule is Gauss's for that density in |c|², times equal angles, c shared out as A² : B².
+
+    Args:
+        source: A, radians.
+        receiver: B, radians; A + B > 0.
+
+    Returns:
+        Unit vectors to the light and to the sensor, and weights that sum to 1.
+    """
+    offset, weight = _gauss(*_overlap(source, receiver), RINGS)
+    angle = 2.0 * np.pi * (np.arange(SPOKES) + 0.5 * (np.arange(RINGS) % 2)[:, None]) / SPOKES
+    share = source**2 / (source**2 + receiver**2)
+
+    def about(radius: np.ndarray) -> np.ndarray:
+        sin = np.sin(radius)[:, None]
+        height = np.broadcast_to(np.cos(radius)[:, None], angle.shape)
+        return np.stack([sin * np.cos(angle), sin * np.sin(angle), height], axis=-1).reshape(-1, 3)
+
+    return about(share * offset), about((1.0 - share) * offset), np.repeat(weight, SPOKES) / SPOKES
+
+
+def _overlap(a: float, b: float) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes |c| and weights of the density of the sum of two uniform discs of radius a and b; weights sum to 1."""
+    low, high = sorted((a, b))
+    x, w = np.polynomial.legendre.leggauss(_DENSE)
+    inner, outer = 0.5 * (x + 1.0) * (high - low), high - low + (x + 1.0) * low
+    first = np.arccos(np.clip((outer**2 + low**2 - high**2) / np.maximum(2 * outer * low, 1e-300), -1, 1))
+    second = np.arccos(np.clip((outer**2 + high**2 - low**2) / (2 * outer * high), -1, 1))
+    kite = (high + low + outer) * (high + low - outer) * (outer - high + low) * (outer + high - low)
+    lens = low**2 * first + high**2 * second - 0.5 * np.sqrt(np.maximum(kite, 0.0))
+    whole = np.pi * (low**2 if low > 0 else 1.0)
+    nodes = np.concatenate([inner, outer])
+    weights = np.concatenate([0.5 * (high - low) * w * inner * whole, low * w * outer * lens])
+    return nodes, weights / weights.sum()
+
+
+def _gauss(nodes: np.ndarray, weights: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The Gauss rule in the square of the nodes, by Stieltjes' procedure (Gautschi 2004, sec. 2.2) and Golub–Welsch."""
+    scale = nodes.max() ** 2
+    u = nodes**2 / scale
+    before, now, norm = np.zeros_like(u), np.ones_like(u), 1.0
+    diagonal, off = np.zeros(count), np.zeros(count)
+    for k in range(count):
+        square = np.sum(weights * now**2)
+        diagonal[k] = np.sum(weights * u * now**2) / square
+        off[k] = square / norm
+        before, now, norm = now, (u - diagonal[k]) * now - (off[k] if k else 0.0) * before, square
+    beside = np.sqrt(off[1:])
+    roots, vectors = np.linalg.eigh(np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1))
+    return np.sqrt(scale * roots), vectors[0] ** 2

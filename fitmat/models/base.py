@@ -1,0 +1,139 @@
+"""What a BRDF is: a frozen module written for one pair of directions, and the one place that maps it over many.
+
+No formula of any material stands here.
+"""
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import ArrayLike, Float
+
+from fitmat._types import Directions, Samples, Scalar, Spectrum, Vec3
+from fitmat.errors import ModelError
+from fitmat.models.parameters import param
+
+
+class AbstractBRDF(eqx.Module):
+    """A reflectance model; its `param` fields are what can be fitted.
+
+    Attributes:
+        breaks: Law → how the model breaks it, in a sentence; see `fitmat.models.laws`.
+    """
+
+    breaks: ClassVar[Mapping[str, str]] = MappingProxyType({})
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """What `fitmat.model` builds it from."""
+
+    @abstractmethod
+    def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
+        """f_r in sr⁻¹, without cosine; 0 where a direction is not above the surface.
+
+        Args:
+            wi: Unit vector to the light, local frame (n = +z).
+            wo: Unit vector to the sensor.
+        """
+
+    @abstractmethod
+    def width(self) -> Scalar:
+        """Slope-like width of the narrowest lobe, in (0, 1]: what a quadrature over directions must resolve."""
+
+    @property
+    @abstractmethod
+    def isotropic(self) -> bool:
+        """Whether only the difference of the two azimuths counts."""
+
+    @abstractmethod
+    def diffuse_albedo(self) -> Spectrum:
+        """Albedo of what leaves in all directions alike, in [0, 1]; what a coat above sends back and forth."""
+
+
+def specular_weight(doc: str = "specular weight; 1 for a bare surface") -> Any:
+    """The parameter ks, in which a specular lobe is linear."""
+    return param(0.0, 10.0, symbol="k_s", per_channel=True, weight=True, default=1.0, doc=doc)
+
+
+class Sum(AbstractBRDF):
+    """The sum of lobes, each with its own parameters; usually one diffuse and one specular lobe."""
+
+    lobes: tuple[AbstractBRDF, ...]
+
+    @property
+    def name(self) -> str:
+        """The lobes' names joined by "+"."""
+        return "+".join(lobe.name for lobe in self.lobes)
+
+    def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
+        """Σ f_k(ω_i, ω_o)."""
+        return sum((lobe(wi, wo) for lobe in self.lobes[1:]), self.lobes[0](wi, wo))
+
+    def width(self) -> Scalar:
+        """That of the narrowest lobe."""
+        return jnp.min(jnp.stack([lobe.width() for lobe in self.lobes]))
+
+    @property
+    def isotropic(self) -> bool:
+        """Where all lobes are."""
+        return all(lobe.isotropic for lobe in self.lobes)
+
+    def diffuse_albedo(self) -> Spectrum:
+        """The sum over the lobes, at most 1."""
+        return jnp.minimum(sum((lobe.diffuse_albedo() for lobe in self.lobes[1:]), self.lobes[0].diffuse_albedo()), 1.0)
+
+
+def evaluate_pairs(model: AbstractBRDF, wi: Directions, wo: Directions) -> Samples:
+    """The model over n pairs, without checks; traceable by JAX."""
+    return jax.vmap(lambda a, b: jnp.atleast_1d(model(a, b)))(wi, wo)
+
+
+def padded_length(count: int) -> int:
+    """The array length to compile for: `count` rounded up by at most an eighth (at least 64).
+
+    JAX compiles a program for every array length; with eight lengths an octave most files share theirs.
+    """
+    step = 2 ** max(4, int(count - 1).bit_length() - 4) if count > 1 else 16
+    return max(64, -(-count // step) * step)
+
+
+def evaluate(model: AbstractBRDF, wi: ArrayLike, wo: ArrayLike) -> Float[np.ndarray, "n c"]:
+    """BRDF values in sr⁻¹ (no cosine) for n pairs of directions.
+
+    Args:
+        model: From `fitmat.model`.
+        wi: Unit vectors to the light, (n, 3), local frame with the normal +z.
+        wo: Unit vectors to the sensor, (n, 3).
+
+    Returns:
+        Values (n, c), one column per channel; 0 where a direction is below the horizon.
+
+    Raises:
+        ModelError: the shapes differ or the vectors are not of unit length.
+
+    Example:
+        >>> import fitmat as fm, numpy as np
+        >>> up = np.array([[0.0, 0.0, 1.0]])
+        >>> fm.evaluate(fm.model("lambert", kd=np.pi / 4), up, up)
+        array([[0.25]])
+    """
+    pair = [np.asarray(w, float) for w in (wi, wo)]
+    if pair[0].shape != pair[1].shape or pair[0].ndim != 2 or pair[0].shape[1] != 3 or len(pair[0]) == 0:
+        raise ModelError(f"wi and wo have shapes {pair[0].shape} and {pair[1].shape}: expected the same (n, 3), n ≥ 1.")
+    for label, w in zip(("wi", "wo"), pair, strict=True):
+        length = np.linalg.norm(w, axis=1)
+        if not np.allclose(length, 1.0, atol=1e-6):
+            row = int(np.argmax(np.abs(length - 1.0)))
+            raise ModelError(f"{label} row {row} has length {length[row]:.6g}: expected unit vectors.")
+    count = len(pair[0])
+    wi, wo = (np.pad(w, ((0, padded_length(count) - count), (0, 0)), mode="edge") for w in pair)
+    return np.asarray(_evaluate_jit(model, jnp.asarray(wi), jnp.asarray(wo)))[:count]
+
+
+_evaluate_jit = eqx.filter_jit(evaluate_pairs)

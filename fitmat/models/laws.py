@@ -1,0 +1,208 @@
+"""The laws of reflection: which of them a model keeps, measured over its parameters and the closed hemisphere.
+
+It measures; what a model is known to break, its class declares (`AbstractBRDF.breaks`).
+"""
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from fitmat.models.albedo import directional_albedo
+from fitmat.models.base import AbstractBRDF, evaluate_pairs
+from fitmat.models.parameters import Entry, entries, space, vector, with_vector
+from fitmat.models.registry import LOBES, OVER
+from fitmat.models.terms.fresnel import AbstractFresnel, White
+
+LAWS = {
+    "positive": "f ≥ 0 for all directions",
+    "reciprocal": "f(ω_i, ω_o) = f(ω_o, ω_i)",
+    "energy": "∫ f c_o dω_o ≤ 1 for light from anywhere, with all weights 1",
+    "gradient": "value and gradient finite on the closed hemisphere, at every bound of the parameters",
+    "furnace": "∫ f c_o dω_o = 1 within 1 % where nothing absorbs, at alpha 0.5",
+}
+"""Law → what it says. Most single-scattering models break the last; the others are declared where broken."""
+
+DRAWS = 8
+"""Sets of parameters that are tried, beside the defaults."""
+
+PAIRS = 400
+"""Pairs of directions that are tried, a quarter of them near the mirror direction."""
+
+ANGLES = np.deg2rad([0.0, 30.0, 60.0, 75.0, 85.0, 89.9])
+"""Incidence angles of the albedo."""
+
+ROUNDING = 1e-9
+"""Relative gap between the two directions that rounding explains."""
+
+QUADRATURE = 2e-3
+"""An albedo is above 1 only if by more than this and more than its error bound."""
+
+FURNACE = 0.01
+
+WHITE = {"ks": 1.0, "kd": 1.0, "base_color": 1.0, "metallic": 1.0, "depth": 0.0}
+"""Parameters of a surface that absorbs nothing, as far as it has them."""
+
+ROUGH = {"alpha": 0.5, "alpha_x": 0.5, "alpha_y": 0.5, "roughness": 0.7}
+
+
+@dataclasses.dataclass(frozen=True)
+class Finding:
+    """One law and one model.
+
+    Attributes:
+        holds: Whether the model kept it.
+        number: What was measured: the smallest value, the largest relative gap, the largest albedo, how many numbers
+            were not finite, the albedo that is farthest from 1.
+    """
+
+    holds: bool
+    number: float
+
+
+def example(name: str) -> str:
+    """A lobe's name as a model of its own; what covers a base covers lambert."""
+    return f"{name}{OVER}lambert" if LOBES[name].kind == "cover" else name
+
+
+def check(template: AbstractBRDF, *, seed: int) -> dict[str, Finding]:
+    """Measure every law on a model.
+
+    Args:
+        template: Gives the parameters and their bounds; its own values are tried first.
+        seed: Of the directions and parameters that are drawn.
+
+    Returns:
+        Law → finding, in the order of `LAWS`.
+    """
+    rng = np.random.default_rng(seed)
+    values = jnp.asarray(_drawn(template, rng))
+    smallest, gap = _signs(template, values, *(jnp.asarray(w) for w in _pairs(rng)))
+    albedo = [directional_albedo(with_vector(template, v), ANGLES) for v in values]
+    above = max(float((a.value - a.error).max()) for a in albedo)
+    white = directional_albedo(_white(template), ANGLES).value.ravel()
+    worst = float(white[np.argmax(np.abs(white - 1.0))])
+    broken = unbounded(template)
+    found = (
+        Finding(bool(smallest >= 0), float(smallest)),
+        Finding(bool(gap < ROUNDING), float(gap)),
+        Finding(above < 1.0 + QUADRATURE, above),
+        Finding(broken == 0, float(broken)),
+        Finding(abs(worst - 1.0) < FURNACE, worst),
+    )
+    return dict(zip(LAWS, found, strict=True))
+
+
+def _range(entry: Entry) -> tuple[float, float]:
+    """Where a parameter is drawn from: its bounds, or where its scale is log the range of its starts."""
+    p = entry.param
+    return (min(p.starts), max(p.starts)) if p.scale == "log" and p.starts else (p.lower, p.upper)
+
+
+def _drawn(template: AbstractBRDF, rng: np.random.Generator) -> Float[np.ndarray, "d p"]:
+    """Parameter vectors with all weights 1: the defaults, all at the lower or upper end, then `DRAWS` at random."""
+    first = np.array(vector(template))
+    rows = np.tile(first, (DRAWS + 3, 1))
+    for entry in entries(template):
+        lower, upper = _range(entry)
+        part = np.concatenate(
+            [np.zeros((1, entry.size)), np.ones((1, entry.size)), rng.uniform(size=(DRAWS, entry.size))]
+        )
+        if entry.param.weight:
+            rows[:, entry.place] = min(1.0, entry.param.upper)
+        elif entry.param.scale == "log":
+            rows[1:, entry.place] = lower * (upper / lower) ** part
+        else:
+            rows[1:, entry.place] = lower + (upper - lower) * part
+    return rows
+
+
+def _white(template: AbstractBRDF) -> AbstractBRDF:
+    """The model with everything that can be white at white, and rough."""
+    if isinstance(getattr(template, "fresnel", None), AbstractFresnel):
+        template = dataclasses.replace(template, fresnel=White())  # pyright: ignore[reportCallIssue]
+    values = np.array(vector(template))
+    for entry in entries(template):
+        wanted = (WHITE | ROUGH).get(entry.name.rpartition(".")[2])
+        if wanted is not None:
+            values[entry.place] = wanted
+    return with_vector(template, jnp.asarray(values))
+
+
+def _pairs(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Directions uniform over the hemisphere, (PAIRS, 3) each; a quarter of the ω_o near the mirror direction."""
+    cos, phi = rng.uniform(size=(2, 2 * PAIRS))
+    sin = np.sqrt(1.0 - cos**2)
+    wi, wo = np.split(np.stack([sin * np.cos(2 * np.pi * phi), sin * np.sin(2 * np.pi * phi), cos], axis=1), 2)
+    near = wi * [-1.0, -1.0, 1.0] + 0.02 * rng.normal(size=wi.shape)
+    near[:, 2] = np.abs(near[:, 2])
+    wo[: PAIRS // 4] = (near / np.linalg.norm(near, axis=1, keepdims=True))[: PAIRS // 4]
+    return wi, wo
+
+
+@eqx.filter_jit
+def _signs(template: AbstractBRDF, values: Array, wi: Array, wo: Array) -> tuple[Array, Array]:
+    """The smallest value, and the largest gap between the two directions relative to their sum."""
+
+    def one(v: Array) -> Array:
+        return evaluate_pairs(with_vector(template, v), jnp.concatenate([wi, wo]), jnp.concatenate([wo, wi]))
+
+    there, back = jnp.split(jax.lax.map(one, values), 2, axis=1)
+    return jnp.min(there), jnp.max(jnp.abs(there - back) / (jnp.abs(there) + jnp.abs(back) + 1e-30))
+
+
+def singular() -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Where formulas of reflection divide by zero or take the root of zero: name → (ω_i, ω_o)."""
+
+    def at(cos: float, phi: float) -> np.ndarray:
+        sin = np.sqrt(1.0 - cos**2)
+        return np.array([sin * np.cos(phi), sin * np.sin(phi), cos])
+
+    normal, oblique, flat, almost = at(1, 0), at(0.6, 1.0), at(0, 0.3), at(1e-12, 0.3)
+    reverse = np.array([-1.0, -1.0, 1.0])
+    return {
+        "normal incidence": (normal, oblique),
+        "both along the normal": (normal, normal),
+        "retro-reflection": (oblique, oblique),
+        "mirror, h = n": (oblique, oblique * reverse),
+        "light at cos 0": (flat, oblique),
+        "light at cos 1e-12": (almost, oblique),
+        "sensor at cos 1e-12": (oblique, almost),
+        "both at cos 1e-12, forward": (almost, almost * reverse),
+        "both at cos 1e-12, backward": (almost, almost),
+        "both at cos 1e-12, across": (almost, at(1e-12, 1.9)),
+        "wi = -wo at the horizon": (flat, -flat),
+        "wi = -wo": (oblique, -oblique),
+        "nearly the normal": (normal, at(1 - 1e-15, 2.0)),
+        "nearly retro-reflection": (oblique, at(0.6 + 1e-9, 1.0)),
+        "nearly the mirror": (oblique, at(0.6, 1.0 + np.pi + 1e-9)),
+    }
+
+
+def unbounded(template: AbstractBRDF) -> int:
+    """How many values and slopes are not finite, at the singular pairs and the corners of the parameters.
+
+    Slopes in all parameters and both directions; corners are all parameters at a lower or upper bound, and each
+    alone at either with the rest as given.
+    """
+    bounds, given = space(template), np.asarray(vector(template))
+    rows = [bounds.lower, bounds.upper]
+    for k in range(len(given)):
+        rows += [np.where(np.arange(len(given)) == k, bound, given) for bound in (bounds.lower, bounds.upper)]
+    wi, wo = (jnp.asarray(np.array(column)) for column in zip(*singular().values(), strict=True))
+    return int(_not_finite(template, jnp.asarray(np.array(rows)), wi, wo))
+
+
+@eqx.filter_jit
+def _not_finite(template: AbstractBRDF, values: Array, wi: Array, wo: Array) -> Array:
+    def total(v: Array, a: Array, b: Array) -> Array:
+        return jnp.sum(with_vector(template, v)(a, b))
+
+    def corner(v: Array) -> Array:
+        found = jax.vmap(jax.value_and_grad(total, argnums=(0, 1, 2)), (None, 0, 0))(v, wi, wo)
+        return sum((jnp.sum(~jnp.isfinite(leaf)) for leaf in jax.tree.leaves(found)), jnp.array(0))
+
+    return jnp.sum(jax.lax.map(corner, values))

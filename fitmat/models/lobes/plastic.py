@@ -1,0 +1,81 @@
+"""Rough plastic: a GGX face over a coloured diffuse body, with the light that bounces between the two."""
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from fitmat._types import Scalar, Spectrum, Vec3
+from fitmat.maths.directions import above
+from fitmat.models.around.coat import RoughCoat, Varnish
+from fitmat.models.base import AbstractBRDF
+from fitmat.models.lobes.lambert import Lambert
+from fitmat.models.parameters import param
+from fitmat.models.terms.distributions import Masking
+
+
+class Plastic(AbstractBRDF):
+    """A dielectric with a rough face over a diffuse body: one alpha and one eta for gloss and colour.
+
+    f = ks F D G/(4 c_i c_o) + T(c_i) T(c_o) kd/(π η² (1 − kd R))
+
+    T(c) is what the rough face lets through, R what its underside returns of diffuse light. Unlike `lambert+ggx` the
+    two terms share the light: where the face mirrors more, less colour comes out, and kd is the albedo of the body
+    inside.
+
+    Parameters: ks, weight of the face's reflection, 0 to 10 (1 for a bare dielectric), shared; alpha, slope
+    parameter, 0.001 to 1, shared: 0.05 is glossy, 0.3 matt; eta, index of refraction, 1 to 3, shared; kd, albedo of
+    the body, 0 to 1, per channel: 0.5 is a mid grey.
+
+    Static choice: masking, as `ggx`; "separable" is Mitsuba's.
+
+    Limits: kd = 0 is black plastic; eta = 1 is `lambert` where alpha is small. Single scattering at the face: what
+    its facets mask after one crossing stays lost, for alpha = 1 more than half at grazing angles. R is all that does
+    not cross from inside; Mitsuba's is what one scattering reflects, so that its body is darker: values for kd = 0.5
+    differ by up to 1 % at alpha 0.03, 3 % at 0.1, 13 % at 0.3. Positive, reciprocal, conserves energy for ks ≤ 1.
+
+    References: B. Walter et al., EGSR 2007; internal reflection: J. Saunderson, JOSA 32, 1942; as in W. Jakob et al.,
+    Mitsuba 3, plugin `roughplastic` with `nonlinear`.
+
+    Example: `fm.model("plastic", kd=0.4, alpha=0.1, eta=1.5)`
+    """
+
+    ks: Scalar = param(
+        0.0, 10.0, symbol="k_s", weight=True, default=1.0, doc="specular weight; 1 for a bare dielectric"
+    )  # fmt: skip
+    alpha: Scalar = param(
+        1e-3, 1.0, symbol="α", scale="log", default=0.1, starts=(0.005, 0.02, 0.06, 0.15, 0.3, 0.6),
+        doc="slope parameter of the face; 0.1 is satin",
+    )  # fmt: skip
+    eta: Scalar = param(
+        1.0, 3.0, symbol="η", scale="log", default=1.5, starts=(1.3, 1.5, 1.8),
+        doc="index of refraction; plastics 1.4–1.6",
+    )  # fmt: skip
+    kd: Spectrum = param(
+        0.0, 1.0, symbol="k_d", per_channel=True, default=0.5, starts=(0.05, 0.3, 0.6, 0.9),
+        doc="albedo of the body below the face",
+    )  # fmt: skip
+    masking: Masking = eqx.field(static=True, default="correlated")
+
+    @property
+    def name(self) -> str:
+        """`plastic`."""
+        return "plastic"
+
+    def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
+        """The face's lobe, and a Lambert body under a rough coat that absorbs nothing."""
+        face = RoughCoat(self.eta, self.alpha, jnp.zeros(()), self.masking)
+        mirrored = face.mirrored(wi, wo)
+        both = Varnish(face, Lambert(self.kd))(wi, wo)
+        return jnp.where(above(wi, wo), both + (self.ks - 1.0) * mirrored, 0.0)
+
+    def width(self) -> Scalar:
+        """Alpha itself."""
+        return self.alpha
+
+    @property
+    def isotropic(self) -> bool:
+        """Yes."""
+        return True
+
+    def diffuse_albedo(self) -> Spectrum:
+        """That of the body."""
+        return self.kd

@@ -1,0 +1,103 @@
+"""Synthetic measurements: a model of known parameters seen by an instrument of known noise.
+
+It fits nothing, reads no file and writes none.
+"""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fitmat.errors import FitmatError, ModelError
+from fitmat.maths.directions import from_angles
+from fitmat.measurements.instrument import IDEAL, Instrument
+from fitmat.measurements.samples import Measurements, from_arrays
+from fitmat.models.around.instrument import Seen
+from fitmat.models.base import AbstractBRDF, evaluate
+from fitmat.models.parameters import vector
+
+
+def simulate(
+    truth: AbstractBRDF,
+    theta_i: ArrayLike,
+    theta_o: ArrayLike,
+    *,
+    relative_noise: float,
+    absolute_noise: float,
+    seed: int,
+    phi: ArrayLike = np.pi,
+    phi_i: ArrayLike = 0.0,
+    channels: tuple[str, ...] | None = None,
+    give_sigma: bool = True,
+    instrument: Instrument = IDEAL,
+) -> Measurements:
+    """Measure a model at every combination of angles, in radians; BRDF in sr⁻¹ without cosine.
+
+    y = f + σ ε, ε ~ N(0, 1), σ² = absolute² + (relative f)², where f is the true value, not y. Values that the noise
+    makes negative are kept.
+
+    Args:
+        truth: From `fitmat.model`.
+        theta_i: Zenith angles of incidence, (a,), 0 to π/2.
+        theta_o: Zenith angles of reflection, (b,), −π/2 to π/2; with the default phi, positive = mirror side.
+        relative_noise: Fraction of the true value, ≥ 0.
+        absolute_noise: In sr⁻¹, ≥ 0.
+        seed: Of numpy's default generator; the same seed gives the same noise.
+        phi: Relative azimuths φ_o − φ_i of positive theta_o, (c,) or one.
+        phi_i: Azimuths of incidence, (d,) or one; of consequence for anisotropic and tilted samples only.
+        channels: Names of the c channels.
+        give_sigma: Whether the measurements know their σ; never where there is no noise.
+        instrument: What shows the surface. Its calibration error is drawn once, from
+            ln g ~ N(0, calibration²); its dark signal must have a value.
+
+    Returns:
+        n = d·a·c·b samples, theta_o running fastest; a sample of σ = 0 among others is masked.
+
+    Raises:
+        FitmatError: the model holds 32-bit floats.
+        ModelError: an angle or a noise is out of range, or the names are not as many as the model's channels.
+
+    Example:
+        >>> import jax
+        >>> jax.config.update("jax_enable_x64", True)
+        >>> from fitmat.models.registry import model
+        >>> gloss = model("lambert+ggx", kd=0.3, alpha=0.1, eta=1.5)
+        >>> simulate(gloss, [0.5, 1.0], [-0.5, 0.5, 1.0], relative_noise=0.02, absolute_noise=1e-3, seed=1).n_samples
+        6
+    """
+    grid = np.meshgrid(phi_i, theta_i, phi, theta_o, indexing="ij")
+    turn, light, relative, sensor = (np.ravel(angle) for angle in grid)
+    _refuse_single_precision(truth)
+    for name, angle in {"theta_i": light, "|theta_o|": np.abs(sensor)}.items():
+        _refuse_outside(name, angle, np.pi / 2, "0 to π/2 radians. Are the angles in degrees?")
+    for name, noise in {"relative_noise": relative_noise, "absolute_noise": absolute_noise}.items():
+        _refuse_outside(name, noise, np.inf, "a finite number of at least 0")
+    wi, wo = from_angles(light, turn), from_angles(np.abs(sensor), turn + relative + np.where(sensor < 0, np.pi, 0.0))
+    rng = np.random.default_rng(seed)
+    scale = jnp.exp(instrument.calibration * rng.normal()) if instrument.calibration else None
+    shown = truth if instrument.ideal else Seen(truth, instrument, scale=scale)
+    exact = evaluate(shown, wi, wo)
+    if channels is not None and len(channels) != exact.shape[1]:
+        raise ModelError(f"{len(channels)} channel names, expected {exact.shape[1]}, one for each of the model's.")
+    sigma = np.hypot(absolute_noise, relative_noise * exact)
+    value = exact + sigma * rng.normal(size=exact.shape)
+    given = sigma if give_sigma and relative_noise + absolute_noise > 0 else None
+    source = f"simulated {truth.name}"
+    measured = from_arrays(
+        light, sensor, value, phi=relative, phi_i=turn, sigma=given, channels=channels, source=source
+    )
+    return dataclasses.replace(measured, instrument=instrument)
+
+
+def _refuse_single_precision(truth: AbstractBRDF) -> None:
+    if vector(truth).dtype != np.float64:
+        raise FitmatError(
+            'fitmat needs 64-bit floats: run jax.config.update("jax_enable_x64", True) before building the model.'
+        )
+
+
+def _refuse_outside(name: str, values: ArrayLike, upper: float, expected: str) -> None:
+    values = np.ravel(np.asarray(values, float))
+    for value in values[~(np.isfinite(values) & (values >= 0) & (values <= upper))][:1]:
+        raise ModelError(f"{name} = {value:g}: expected {expected}.")

@@ -1,0 +1,178 @@
+"""The instrument: apertures against brute-force averages, calibration and dark signal against planted ones."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.stats import qmc
+
+import fitmat as fm
+from fitmat.errors import ReadError
+from fitmat.maths.directions import from_angles
+from fitmat.measurements.instrument import IDEAL, Instrument
+from fitmat.models.around.instrument import Seen, cone_rule, surface
+from fitmat.models.base import AbstractBRDF
+
+DEGREE = np.pi / 180
+THETA_I = np.array([10.0, 30.0, 50.0, 70.0]) * DEGREE
+THETA_O = np.arange(-80.0, 80.5, 2.0) * DEGREE
+
+WIDE = 4e-3
+"""Of the average where source and receiver together are twice as wide as the lobe, Sobol's error included."""
+
+THREE = 3.0
+"""Standard deviations within which a recovered parameter may lie."""
+
+
+def cap(points: np.ndarray, half_angle: float, axis: np.ndarray) -> np.ndarray:
+    """Directions uniform in solid angle within a cone, from points of the unit square (Archimedes)."""
+    z = 1.0 - points[:, 0] * (1.0 - np.cos(half_angle))
+    r, psi = np.sqrt(1.0 - z * z), 2.0 * np.pi * points[:, 1]
+    first = np.cross(axis, [0.0, 1.0, 0.0])
+    first /= np.linalg.norm(first)
+    return np.outer(r * np.cos(psi), first) + np.outer(r * np.sin(psi), np.cross(axis, first)) + np.outer(z, axis)
+
+
+def averaged(model: AbstractBRDF, wi: np.ndarray, wo: np.ndarray, instrument: Instrument) -> np.ndarray:
+    """Nicodemus' average of a BRDF over both projected cones, by 4,096 Sobol points each pair of directions."""
+    points = qmc.Sobol(4, scramble=False).random(4096)
+    found = []
+    for i, o in zip(wi, wo, strict=True):
+        lights, sensors = cap(points[:, :2], instrument.source, i), cap(points[:, 2:], instrument.receiver, o)
+        product = lights[:, 2] * sensors[:, 2]
+        found.append((product[:, None] * fm.evaluate(model, lights, sensors)).sum(axis=0) / product.sum())
+    return np.array(found)
+
+
+def plane(theta_i: np.ndarray, theta_o: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Directions of every pair of incidence and signed outgoing angle."""
+    light, sensor = (a.ravel() for a in np.meshgrid(theta_i, theta_o, indexing="ij"))
+    return from_angles(light, np.zeros_like(light)), from_angles(np.abs(sensor), np.where(sensor > 0, np.pi, 0.0))
+
+
+@pytest.mark.parametrize(("source", "receiver"), [(2.0, 0.0), (0.0, 2.0), (1.0, 1.0), (0.3, 1.7)])
+def test_apertures_average_as_brute_force_does(source: float, receiver: float) -> None:
+    base, instrument = fm.model("ggx", alpha=0.0175, eta=1.5), Instrument(source * DEGREE, receiver * DEGREE)
+    wi, wo = plane(THETA_I, np.array([-30.0, 5.0, 10.0, 28.0, 30.0, 31.0, 47.0, 50.0, 53.0, 68.0, 70.0, 75.0]) * DEGREE)
+    shown, expected = fm.evaluate(Seen(base, instrument), wi, wo), averaged(base, wi, wo, instrument)
+    np.testing.assert_allclose(shown, expected, rtol=WIDE)
+    assert np.max(np.abs(fm.evaluate(base, wi, wo) / expected - 1.0)) > 0.5  # what the average changes
+
+
+def test_a_lambertian_surface_looks_the_same_through_any_aperture() -> None:
+    """As long as no part of a cone lies below the horizon."""
+    wi, wo = plane(THETA_I, np.arange(-70.0, 71.0, 10.0) * DEGREE)
+    shown = fm.evaluate(Seen(fm.model("lambert", kd=0.3), Instrument(0.1, 0.2)), wi, wo)
+    np.testing.assert_allclose(shown, 0.3 / np.pi, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("source", "receiver"), [(0.01, 0.0), (0.0, 0.03), (0.02, 0.02), (0.01, 0.03)])
+def test_the_cone_rule_has_the_variance_of_two_discs(source: float, receiver: float) -> None:
+    """A uniform disc of radius A has the variance A²/4 along each axis; independent offsets add theirs."""
+    lights, sensors, weights = cone_rule(source, receiver)
+    offset = (lights + sensors)[:, :2]
+    assert weights.sum() == pytest.approx(1.0, abs=1e-12)
+    expected = (source**2 + receiver**2) / 4 * np.eye(2)
+    np.testing.assert_allclose(offset.T * weights @ offset, expected, rtol=1e-3, atol=1e-9)
+
+
+@pytest.mark.parametrize("alpha", [0.02, 0.03])
+def test_wide_apertures_do_not_bias_alpha(alpha: float) -> None:
+    """Mirror-like data averaged by brute force, read with 1.5° receiver and 0.5° source; then without saying so."""
+    truth = fm.model("lambert+ggx", kd=0.1, alpha=alpha, eta=1.5)
+    instrument = Instrument(source=0.5 * DEGREE, receiver=1.5 * DEGREE)
+    wi, wo = plane(THETA_I, np.arange(-80.0, 80.5, 1.0) * DEGREE)
+    exact = averaged(truth, wi, wo, instrument)
+    for seed in range(3):
+        sigma = np.hypot(0.02 * exact, 1e-3)
+        value = exact + sigma * np.random.default_rng(seed).normal(size=exact.shape)
+        valid = np.ones(value.shape, bool)
+        m = fm.Measurements(wi, wo, value, sigma, valid, ("value",), instrument=instrument)
+        z = deviations(fm.fit(m, "lambert+ggx", fixed={"ks": 1.0}), alpha=alpha, kd=0.1, eta=1.5)
+        assert np.max(np.abs(z)) <= THREE
+        blind = fm.fit(dataclasses.replace(m, instrument=IDEAL), "lambert+ggx", fixed={"ks": 1.0})
+        assert deviations(blind, alpha=alpha)[0] > 10.0
+
+
+def deviations(fit: fm.Fit, **truth: float) -> list[float]:
+    """(estimate − truth)/sd of the named parameters."""
+    sd, places = np.sqrt(np.diagonal(fit.covariance)), {e.name: e.place.start for e in fit.entries}
+    return [float((fit.values[places[name]] - true) / sd[places[name]]) for name, true in truth.items()]
+
+
+def test_a_shared_calibration_error_is_covered() -> None:
+    """95 % intervals of kd over 200 repeats with a 3 % scale error: with the correlated term, and without it."""
+    truth, instrument = fm.model("lambert+ggx", kd=0.3, alpha=0.2, eta=1.5), Instrument(calibration=0.03)
+    inside, blind = [], []
+    for seed in range(200):
+        m = fm.simulate(truth, THETA_I, THETA_O, relative_noise=0.02, absolute_noise=1e-3, seed=seed,
+                        instrument=instrument)  # fmt: skip
+        for told, found in ((m, inside), (dataclasses.replace(m, instrument=IDEAL), blind)):
+            fit = fm.fit(told, "lambert+ggx")
+            found.append(abs(deviations(fit, kd=0.3)[0]) < 1.96)
+    print(f"coverage of kd: {np.mean(inside):.3f} with the correlated term, {np.mean(blind):.3f} without")
+    assert 0.92 <= np.mean(inside) <= 0.98
+    assert np.mean(blind) < 0.3
+
+
+def test_a_planted_dark_signal_is_recovered() -> None:
+    truth = fm.model("lambert+ggx", kd=0.05, alpha=0.1, eta=1.5)
+    shown = Instrument(dark=0.01)
+    m = fm.simulate(truth, THETA_I, THETA_O, relative_noise=0.02, absolute_noise=1e-4, seed=3, instrument=shown)
+    known = fm.fit(m, "lambert+ggx", fixed={"ks": 1.0})
+    fitted = fm.fit(dataclasses.replace(m, instrument=Instrument(dark=None)), "lambert+ggx", fixed={"ks": 1.0})
+    assert np.max(np.abs(deviations(known, kd=0.05, alpha=0.1, eta=1.5))) <= THREE
+    assert np.max(np.abs(deviations(fitted, kd=0.05, alpha=0.1, eta=1.5, dark=0.01))) <= THREE
+
+
+def test_a_calibration_prior_is_sampled_as_it_is_given() -> None:
+    """Data that say nothing of the scale leave ln g its prior, N(0, 0.1²)."""
+    flat = fm.from_arrays(np.full(60, 0.5), np.linspace(-1.2, 1.2, 60), np.full(60, 0.1), sigma=np.full(60, 1e-4),
+                          instrument=Instrument(calibration=0.1))  # fmt: skip
+    posterior = fm.sample(fm.fit(flat, "lambert"), seed=0)
+    place = next(e.place.start for e in posterior.fit.entries if e.name == "scale")
+    logs = np.log(posterior.values[:, place])
+    assert posterior.verdict == "reliable"
+    # Some 2,500 effective draws: the mean is good to 0.002, the sd to 1.4 %.
+    assert logs.mean() == pytest.approx(0.0, abs=0.006)
+    assert logs.std() == pytest.approx(0.1, rel=0.05)
+
+
+def test_the_match_is_of_the_surfaces_and_not_of_the_instrument() -> None:
+    truth = fm.model("lambert+blinn-phong", kd=0.3, ks=0.2, exponent=100.0)
+    m = fm.simulate(truth, THETA_I, THETA_O, relative_noise=0.01, absolute_noise=1e-4, seed=0)
+    through = dataclasses.replace(m, value=m.value * 1.03, instrument=Instrument(calibration=0.03))
+    plain, shown = (
+        fm.compare(*(fm.laplace(fm.fit(x, name), seed=0) for name in ("lambert+blinn-phong", "lambert+ggx")))
+        for x in (m, through)
+    )
+    assert shown.hemisphere_distance.value == pytest.approx(plain.hemisphere_distance.value, rel=0.02)
+
+
+def test_surface_takes_off_instrument_and_mount() -> None:
+    base = fm.model("lambert")
+    assert surface(Seen(fm.model("tilt-over-lambert"), Instrument(0.1))).name == "lambert"
+    assert surface(base) is base
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"source": 1.0}, r"source = 1 of the instrument, expected 0 to 0.5236 radians"),
+        ({"receiver": -0.1}, r"receiver = -0.1 of the instrument"),
+        ({"calibration": np.nan}, r"calibration = nan of the instrument, expected 0 to 1\."),
+        ({"dark": np.inf}, r"dark = inf of the instrument"),
+    ],
+)
+def test_impossible_instruments_are_refused(given: dict[str, float], message: str) -> None:
+    with pytest.raises(ReadError, match=message):
+        Instrument(**given)
+
+
+def test_an_instrument_says_what_it_does() -> None:
+    words = str(Instrument(0.5 * DEGREE, 1.5 * DEGREE, 0.03, None))
+    assert words == (
+        "Instrument: source of 0.5° half-angle; receiver of 1.5° half-angle; calibration good to 3 %, shared by all "
+        "values; dark signal fitted."
+    )
+    assert str(IDEAL) == ""

@@ -1,0 +1,204 @@
+"""Kulla and Conty's lobe in the white furnace, against Cycles' albedo tables, by hand, and in its limits."""
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import fitmat as fm
+from fitmat.maths.directions import from_angles
+from fitmat.maths.quadrature import cosine_mean
+from fitmat.models.albedo import directional_albedo
+from fitmat.models.base import evaluate_pairs
+from fitmat.models.lobes.kulla_conty import KullaConty
+from fitmat.models.lobes.microfacet import Microfacet
+from fitmat.models.parameters import entries, space, vector, with_vector
+from fitmat.models.terms.distributions import GGX, AbstractDistribution, Beckmann, Isotropic
+from fitmat.models.terms.fresnel import White
+
+FURNACE = 0.01
+"""Absolute; what the manual page claims for any alpha."""
+
+FURNACE_ROUGH = 0.0025
+"""Absolute; the same for alpha ≥ 0.01: 0.002, and 0.0005 of the quadrature here."""
+
+CURVE = 0.002
+"""Absolute; what `kulla_conty.NODES` claims for the albedo, alpha ≥ 0.01."""
+
+BY_HAND = 0.01
+"""Relative; three albedos, each known to 0.002, enter as 1 − E ≈ 0.3 to 0.5."""
+
+DIFFERENCES = 0.01
+"""Relative to |∂f/∂p| + |f|/p; the rule moves with alpha in the differences and stands still in the slope."""
+
+Hemisphere = Any
+Pairs = dict[str, tuple[np.ndarray, np.ndarray]]
+DISTRIBUTIONS: dict[str, AbstractDistribution] = {"ggx": GGX(), "beckmann": Beckmann()}
+
+ROUGH = np.array([3, 5, 10, 16, 22, 31]) / 31
+"""Cycles' roughness, √alpha, at some columns of its tables."""
+
+CYCLES = {
+    3 / 31: (0.994519, 0.959460, 0.884058, 0.893246, 0.862365, 0.765057),
+    15 / 31: (0.999762, 0.998053, 0.964995, 0.843295, 0.698566, 0.457779),
+    1.0: (0.999911, 0.999296, 0.987261, 0.903873, 0.684249, 0.306853),
+}
+"""Cosine → albedo of white GGX, single scattering, Smith height-correlated, at `ROUGH`; the first at cosine 3/31.
+
+Blender Cycles (Apache-2.0), intern/cycles/scene/shader.tables, `table_ggx_E`, computed with 10⁸ samples a number.
+"""
+
+CYCLES_MEAN = (0.999548, 0.997199, 0.970160, 0.870874, 0.697631, 0.409137)
+"""E_avg at `ROUGH`, `table_ggx_Eavg` of the same file."""
+
+
+def _white(distribution: str, alpha: float) -> KullaConty:
+    return KullaConty(jnp.ones(()), Isotropic(jnp.array(alpha)), White(), DISTRIBUTIONS[distribution])
+
+
+@eqx.filter_jit
+def _curve(model: KullaConty, cos: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """E at cosines, and E_avg."""
+    albedo = model.white_albedo()
+    return jax.vmap(albedo)(cos), cosine_mean(albedo)
+
+
+def _single(distribution: str, alpha: float, cos: float, cells: int = 700) -> float:
+    """The albedo of single scattering with F = 1, E = ∫ D c_h G2 (ω_i·h)/(c_i c_h) dω_h, with quantiles of D c_h.
+
+    D and Λ in plain numpy after Heitz 2014, eqs. 54, 61, 63, 72.
+    """
+    from scipy.special import erf
+
+    def smith(w: np.ndarray) -> np.ndarray:
+        a = w[2] / (alpha * np.sqrt(np.maximum(1 - w[2] ** 2, 1e-30)))
+        if distribution == "ggx":
+            return (np.sqrt(1 + 1 / a**2) - 1) / 2
+        return (erf(a) - 1) / 2 + np.exp(-(a**2)) / (2 * a * np.sqrt(np.pi))
+
+    t, u2 = (part.ravel() for part in np.meshgrid(*[(np.arange(cells) + 0.5) / cells] * 2))
+    u, density = 1 - (1 - t) ** 2, 2 * (1 - t)
+    slope = alpha * np.sqrt(u / (1 - u) if distribution == "ggx" else -np.log1p(-u))
+    h = np.stack([slope * np.cos(2 * np.pi * u2), slope * np.sin(2 * np.pi * u2), np.ones_like(u)])
+    h /= np.sqrt(1 + slope**2)
+    wi = np.array([np.sqrt(1 - cos**2), 0.0, cos])
+    cos_d = wi @ h
+    wo = 2 * cos_d * h - wi[:, None]
+    seen = (wo[2] > 1e-12) & (cos_d > 0)
+    both = 1 / (1 + smith(wi) + smith(np.where(seen, wo, np.array([[0.0], [0.0], [1.0]]))))
+    return float(np.sum(density * np.where(seen, both * cos_d / (cos * h[2]), 0.0)) / len(u))
+
+
+def _multiple(model: KullaConty, cos: float) -> float:
+    """2π∫ (f − f_single) c dc; it has no azimuth, so it is taken where the lobe is dark."""
+    x, weights = np.polynomial.legendre.leggauss(64)
+    co = ((x + 1) / 2) ** 2
+    across = np.stack([0 * co, np.sqrt(1 - co**2), co], axis=1)
+    wi = np.tile([np.sqrt(1 - cos**2), 0.0, cos], (64, 1))
+    bare = Microfacet(model.ks, model.roughness, model.fresnel, model.distribution)
+    difference = fm.evaluate(model, wi, across)[:, 0] - fm.evaluate(bare, wi, across)[:, 0]
+    return float(2 * np.pi * np.sum(weights * np.sqrt(co) * co * difference))
+
+
+@pytest.mark.parametrize("alpha", [0.001, 0.01, 0.1, 0.3, 0.6, 1.0])
+@pytest.mark.parametrize("distribution", DISTRIBUTIONS)
+def test_the_white_furnace_gives_back_all_light(distribution: str, alpha: float) -> None:
+    """Single scattering by an integral of its own, multiple scattering by Gauss in √c."""
+    model, allowed = _white(distribution, alpha), FURNACE_ROUGH if alpha >= 0.01 else FURNACE
+    for degrees in (0.1, 30.0, 60.0, 80.0, 85.0, 89.0):
+        cos = float(np.cos(np.deg2rad(degrees)))
+        assert _single(distribution, alpha, cos) + _multiple(model, cos) == pytest.approx(1.0, abs=allowed), degrees
+
+
+@pytest.mark.parametrize("column", range(len(ROUGH)))
+def test_albedos_are_those_of_cycles(column: int) -> None:
+    cosines = np.array(list(CYCLES))
+    found, mean = _curve(_white("ggx", ROUGH[column] ** 2), jnp.array(cosines))
+    np.testing.assert_allclose(found, [row[column] for row in CYCLES.values()], atol=CURVE)
+    assert float(mean) == pytest.approx(CYCLES_MEAN[column], abs=CURVE)
+
+
+def test_albedo_at_alpha_1_and_normal_incidence_is_closed() -> None:
+    """D = 1/π, G1(o) = (2c²−1)/c² for θ_o = 2θ_h: 2∫ (2c²−1)/c dc from 1/√2 to 1 is 1 − ln 2."""
+    found, _ = _curve(_white("ggx", 1.0), jnp.ones(1))
+    assert float(found[0]) == pytest.approx(1 - np.log(2), abs=CURVE)
+    assert _single("ggx", 1.0, 1 - 1e-12) == pytest.approx(1 - np.log(2), abs=1e-4)
+
+
+@pytest.mark.parametrize("distribution", DISTRIBUTIONS)
+def test_the_curve_is_as_near_as_stated(distribution: str) -> None:
+    cosines = np.array([0.02, 0.05, 0.2, 0.5, 0.9])
+    for alpha in (0.01, 0.05, 0.2, 0.7, 1.0):
+        found, _ = _curve(_white(distribution, alpha), jnp.array(cosines))
+        expected = [_single(distribution, alpha, cos) for cos in cosines]
+        np.testing.assert_allclose(found, expected, atol=CURVE, err_msg=f"{alpha}")
+
+
+def test_multiple_scattering_by_hand() -> None:
+    """Cycles' albedos at alpha (22/31)², cosines 15/31 and 1, and Schlick's average F0 + (1 − F0)/21."""
+    alpha, f0, ks = (22 / 31) ** 2, 0.6, 0.8
+    ei, eo, mean = CYCLES[15 / 31][4], CYCLES[1.0][4], CYCLES_MEAN[4]
+    f_avg = f0 + (1 - f0) / 21
+    f_ms = f_avg**2 * mean / (1 - f_avg * (1 - mean))
+    by_hand = ks * f_ms * (1 - ei) * (1 - eo) / (np.pi * (1 - mean))
+    wi, up = np.array([[np.sqrt(1 - (15 / 31) ** 2), 0, 15 / 31]]), np.array([[0.0, 0.0, 1.0]])
+    both, single = (
+        fm.evaluate(fm.model(name, alpha=alpha, f0=f0, ks=ks), wi, up)[0, 0]
+        for name in ("ggx-kc-schlick", "ggx-schlick")
+    )
+    assert both - single == pytest.approx(by_hand, rel=BY_HAND)
+
+
+def test_a_smooth_surface_has_nothing_to_give_back(hemisphere: Hemisphere) -> None:
+    """At alpha 0.001 and cosines above 0.2 what is missing is of the order alpha², 1e-5."""
+    wi, wo = (w[w[:, 2] > 0.2][:40] for w in (hemisphere(80, 1), hemisphere(80, 2)))
+    compensated, bare = (fm.evaluate(fm.model(name, alpha=1e-3), wi, wo) for name in ("ggx-kc", "ggx"))
+    np.testing.assert_allclose(compensated, bare, atol=1e-5)
+
+
+def test_a_coloured_metal_gets_more_saturated() -> None:
+    """Light that met several facets took the colour several times: red over blue of rough gold grows."""
+    compensated, bare = (
+        directional_albedo(fm.model(name, f0=np.array([0.95, 0.4]), alpha=0.8, channels=2), np.zeros(1)).value[0]
+        for name in ("ggx-kc-schlick", "ggx-schlick")
+    )
+    assert np.all(compensated > bare)
+    assert compensated[0] / compensated[1] > 1.05 * bare[0] / bare[1]
+
+
+@pytest.mark.parametrize("name", ["ggx-kc-conductor", "beckmann-kc-schlick"])
+def test_the_lobe_is_reciprocal(hemisphere: Hemisphere, name: str) -> None:
+    wi, wo, model = hemisphere(60, 3), hemisphere(60, 4), fm.model(name, alpha=0.7)
+    np.testing.assert_allclose(fm.evaluate(model, wi, wo), fm.evaluate(model, wo, wi), rtol=1e-10)
+
+
+def test_gradients_are_finite_differences(hemisphere: Hemisphere, singular: Pairs) -> None:
+    """By jacfwd in alpha, f0 and ks; finite at the singular pairs and at the bounds."""
+    model = fm.model("ggx-kc-schlick", alpha=0.5, f0=0.3)
+    special_i, special_o = (np.array(column) for column in zip(*singular.values(), strict=True))
+    wi, wo = (jnp.array(np.concatenate(p)) for p in ((hemisphere(20, 5), special_i), (hemisphere(20, 6), special_o)))
+
+    @jax.jit
+    def both(point: jax.Array) -> tuple[jax.Array, jax.Array]:
+        def values(point: jax.Array) -> jax.Array:
+            return evaluate_pairs(with_vector(model, point), wi, wo)[:, 0]
+
+        return values(point), jax.jacfwd(values)(point)
+
+    bounds, point = space(model), np.asarray(vector(model))
+    for corner in (bounds.lower, bounds.upper):
+        assert all(np.isfinite(part).all() for part in both(jnp.array(corner)))
+    value, slopes = (np.asarray(part)[:20] for part in both(jnp.array(point)))
+    for k, entry in enumerate(entries(model)):
+        step = 1e-2 * point[k]
+        at = [np.asarray(both(jnp.array(point + j * step * (np.arange(3) == k)))[0])[:20] for j in (-2, -1, 1, 2)]
+        expected = (at[0] - 8 * at[1] + 8 * at[2] - at[3]) / (12 * step)
+        assert np.all(np.abs(slopes[:, k] - expected) < DIFFERENCES * (np.abs(expected) + value / point[k])), entry.name
+
+
+def test_light_from_below_gives_nothing() -> None:
+    below = from_angles(np.deg2rad([100.0, 30.0]), np.zeros(2))
+    assert (fm.evaluate(fm.model("ggx-kc"), below, below[::-1]) == 0).all()
