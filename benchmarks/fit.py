@@ -18,8 +18,8 @@ import scipy.optimize
 from peer import Problem, from_sine
 
 import fitmat as fm
-from fitmat.fitting import Chart, descend
-from fitmat.likelihood import Data, first_discrepancy, prepare
+from fitmat.fitting.fitting import Chart, descend
+from fitmat.fitting.likelihood import Data, first_discrepancy, prepare
 from fitmat.maths.least_squares import Minimum
 from fitmat.measurements.noise import measured_noise
 from fitmat.measurements.samples import Measurements

@@ -13,7 +13,8 @@ from .errors import FitmatError as FitmatError
 from .examination import Examination as Examination
 from .examination import examine as examine
 from .examination.plots import plot_examination as plot_examination
-from .fitting import fit as fit
+from .fitting.fitting import fit as fit
+from .fitting.result import Fit as Fit
 from .identifiability import Identifiability as Identifiability
 from .identifiability import identify as identify
 from .imitation import imitate as imitate
@@ -34,7 +35,6 @@ from .models.multiple_scattering.surface import Surface as Surface
 from .models.registry import model as model
 from .models.simulation import simulate as simulate
 from .nuts import check_posterior as check_posterior
-from .outcome import Fit as Fit
 from .plots import plot_ablation as plot_ablation
 from .plots import plot_albedo as plot_albedo
 from .plots import plot_choice as plot_choice

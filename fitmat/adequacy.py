@@ -10,11 +10,11 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import norm
 
-from fitmat.information import MISSES
-from fitmat.losses import bad_probability
+from fitmat.fitting.information import MISSES
+from fitmat.fitting.losses import bad_probability
+from fitmat.fitting.result import Fit
 from fitmat.maths.directions import signed_zenith
 from fitmat.measurements.noise import leave_one_out
-from fitmat.outcome import Fit
 from fitmat.prediction import standardised_residuals
 
 CHANCE = 1e-3

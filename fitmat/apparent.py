@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.outcome import Fit
+from fitmat.fitting.result import Fit
 
 
 @dataclasses.dataclass(frozen=True)

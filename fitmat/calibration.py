@@ -19,17 +19,17 @@ from scipy.stats import binomtest
 
 from fitmat.approximation import laplace
 from fitmat.errors import FitmatError
-from fitmat.fitting import fit
-from fitmat.likelihood import Data, log_likelihood, mapped
+from fitmat.fitting.fitting import fit
+from fitmat.fitting.likelihood import Data, log_likelihood, mapped
+from fitmat.fitting.priors import DISCREPANCY, draw, prepared
+from fitmat.fitting.result import free_places
+from fitmat.fitting.stabilising import from_stabilised, stabilised
 from fitmat.measurements.instrument import IDEAL
 from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF, evaluate, evaluate_pairs
 from fitmat.models.parameters import entries, vector, with_vector
 from fitmat.models.registry import model
-from fitmat.outcome import free_places
 from fitmat.posterior import Posterior
-from fitmat.priors import DISCREPANCY, draw, prepared
-from fitmat.stabilising import from_stabilised, stabilised
 from fitmat.uncertainty import sample
 from fitmat.uniformity import p_values
 

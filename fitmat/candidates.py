@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float
 
+from fitmat.fitting.result import Fit
 from fitmat.maths.directions import from_angles
-from fitmat.outcome import Fit
 from fitmat.prediction import sections
 
 Kind = Literal["sample", "curve"]

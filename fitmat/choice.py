@@ -12,9 +12,9 @@ import numpy as np
 from fitmat.crossvalidation import LeftOut, leave_incidences_out
 from fitmat.errors import FitmatError
 from fitmat.evidence import Evidence, weigh
+from fitmat.fitting.result import Fit
 from fitmat.measurements.samples import Measurements
 from fitmat.models.registry import LOBES
-from fitmat.outcome import Fit
 from fitmat.plausibility import broken_laws, doubts
 from fitmat.posterior import Posterior
 from fitmat.text import html_table, text_table

@@ -78,14 +78,15 @@ def fit(
 ) -> None:
     """Fit models to a file of measurements and write a report with the Phong–microfacet match."""
     _setup()
-    from fitmat import conditions, console, files, priors, report, screen
+    from fitmat import console, files, report, screen
+    from fitmat.fitting import known, priors
     from fitmat.measurements.samples import Measurements
     from fitmat.models.parameters import assignments
 
     fixed, believed = assignments(fix or [], "--fix"), priors.assignments(prior or [])
     measurements = console.source(file, reading | {"instrument": instrument})
     shown = measurements if isinstance(measurements, Measurements) else measurements.part
-    known = conditions.prepared(console.model_names(models, shown), shown, ior=ior, tilt=tilt)
+    known = known.prepared(console.model_names(models, shown), shown, ior=ior, tilt=tilt)
     target = out or files.default(file)
     with files.new(target, force=force, stale=report.POSTERIOR.format("*")) as draft:
         process.leave_on_interrupt(draft)

@@ -17,6 +17,7 @@ from fitmat.ablation import Ablation, ablate
 from fitmat.distances import ANGLES, Distances, Values, measure_distances
 from fitmat.errors import FitmatError
 from fitmat.estimate import Estimate, band, estimate
+from fitmat.fitting.result import Fit
 from fitmat.headline import CLOSE as CLOSE
 from fitmat.headline import SIMILAR as SIMILAR
 from fitmat.headline import STRONG_EVIDENCE as STRONG_EVIDENCE
@@ -24,7 +25,6 @@ from fitmat.imitation import Imitation, imitate
 from fitmat.measurements.samples import Measurements
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
 from fitmat.models.registry import LOBES, lobe_names
-from fitmat.outcome import Fit
 from fitmat.posterior import Posterior
 from fitmat.telling import Telling, tell_apart
 

@@ -18,20 +18,20 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
 
 from fitmat.approximation import laplace, laplace_each
-from fitmat.bulk import fit_chunks
 from fitmat.choice import every_model
 from fitmat.comparison import Comparison, compare, is_empirical, is_microfacet
 from fitmat.errors import ModelError
-from fitmat.losses import DEFAULT
+from fitmat.fitting.losses import DEFAULT
+from fitmat.fitting.priors import DISCREPANCY
+from fitmat.fitting.result import Fit
+from fitmat.fitting.streamed import fit_chunks
 from fitmat.measurements.large import chunks
 from fitmat.measurements.large.stream import Rows, held
 from fitmat.measurements.reader import read
 from fitmat.measurements.samples import Measurements
 from fitmat.models.parameters import entries
 from fitmat.models.registry import LOBES, lobe_names, model, normalised
-from fitmat.outcome import Fit
 from fitmat.posterior import Posterior
-from fitmat.priors import DISCREPANCY
 from fitmat.study import Study, concluded
 from fitmat.uncertainty import resumable_steps, sample
 
@@ -77,7 +77,7 @@ class Plan:
     """How measurements are studied.
 
     Attributes:
-        known: Model name → parameters that are known of it beforehand (`conditions.prepared`).
+        known: Model name → parameters that are known of it beforehand (`known.prepared`).
         fixed: Parameters to hold in every model that has them; at least one must.
         priors: What is known beforehand, in every model that has the parameter; at least one must.
         loss: What the fits minimise, by name.

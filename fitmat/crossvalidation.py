@@ -11,12 +11,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.fitting import refine
-from fitmat.likelihood import Data, first_discrepancy, mapped, residuals
+from fitmat.fitting.fitting import refine
+from fitmat.fitting.likelihood import Data, first_discrepancy, mapped, residuals
+from fitmat.fitting.result import Fit
 from fitmat.measurements.incidences import incidences
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.parameters import with_vector
-from fitmat.outcome import Fit
 
 MOST_REFITTED = 50_000
 """Values above which nothing is refitted."""

@@ -18,8 +18,8 @@ from jaxtyping import Float
 from fitmat.candidates import Candidates, Kind, Limits, proposed
 from fitmat.errors import FitmatError
 from fitmat.filter_bank import Bank, Task, bank, scores
+from fitmat.fitting.result import Fit
 from fitmat.measurements.noise import noise_law
-from fitmat.outcome import Fit
 from fitmat.posterior import Posterior
 from fitmat.profile_likelihood import free_names
 

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.likelihood import Data, log_pointwise, mapped
+from fitmat.fitting.likelihood import Data, log_pointwise, mapped
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import with_vector
 from fitmat.posterior import GOOD_PARETO, Posterior

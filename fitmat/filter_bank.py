@@ -11,11 +11,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.likelihood import mapped
-from fitmat.losses import Loss
+from fitmat.fitting.likelihood import mapped
+from fitmat.fitting.losses import Loss
+from fitmat.fitting.result import Fit
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import space, with_vector
-from fitmat.outcome import Fit
 from fitmat.profile_likelihood import profiles
 from fitmat.ridge import Ridge, ridge
 

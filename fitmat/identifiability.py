@@ -8,11 +8,11 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.information import UNDETERMINED
+from fitmat.fitting.information import UNDETERMINED
+from fitmat.fitting.priors import natural_sd
+from fitmat.fitting.result import Fit
 from fitmat.models.parameters import space
-from fitmat.outcome import Fit
 from fitmat.posterior import Posterior
-from fitmat.priors import natural_sd
 from fitmat.profile_likelihood import Profile, profiles
 from fitmat.ridge import Ridge, ridge
 from fitmat.text import html_table, interval, text_table, with_error

@@ -11,7 +11,7 @@ from rich.progress import track
 from rich.table import Table
 from rich.text import Text
 
-from fitmat.losses import LOSSES
+from fitmat.fitting.losses import LOSSES
 from fitmat.models import laws
 from fitmat.models.registry import LOBES, lobe_names, model
 

@@ -5,9 +5,9 @@ Compares no models with each other; `comparison` does.
 
 import numpy as np
 
+from fitmat.fitting.result import Fit
 from fitmat.measurements.samples import Measurements
 from fitmat.models.base import evaluate
-from fitmat.outcome import Fit
 
 
 def fit_metrics(fit: Fit) -> dict[str, float | None]:

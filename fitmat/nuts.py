@@ -17,9 +17,9 @@ from fitmat.apparent import Apparent, apparent
 from fitmat.approximation import draws
 from fitmat.density import log_density_at, physical
 from fitmat.errors import FitmatError
-from fitmat.likelihood import mapped
+from fitmat.fitting.likelihood import mapped
+from fitmat.fitting.result import Fit
 from fitmat.models.parameters import space
-from fitmat.outcome import Fit
 from fitmat.posterior import ENOUGH_ESS, GOOD_RHAT, Posterior
 from fitmat.text import html_table, text_table
 

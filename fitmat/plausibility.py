@@ -6,11 +6,11 @@ out; they break laws by right.
 
 import numpy as np
 
+from fitmat.fitting.result import Fit
 from fitmat.models.albedo import directional_albedo
 from fitmat.models.around.instrument import surface
 from fitmat.models.base import AbstractBRDF, evaluate
 from fitmat.models.parameters import space
-from fitmat.outcome import Fit
 
 ANGLES = np.deg2rad([0.0, 30.0, 60.0, 75.0, 85.0])
 """Incidence angles of the albedo, radians."""

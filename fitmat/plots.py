@@ -14,8 +14,8 @@ from fitmat.ablation import Ablation
 from fitmat.choice import SMALL, Choice
 from fitmat.comparison import Comparison
 from fitmat.design import Design
+from fitmat.fitting.result import Fit
 from fitmat.maths.directions import signed_zenith
-from fitmat.outcome import Fit
 from fitmat.posterior import Posterior
 from fitmat.prediction import Section, curve, predictive_band, standardised_residuals
 from fitmat.regions import REGIONS

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.outcome import Fit
+from fitmat.fitting.result import Fit
 from fitmat.text import html_table, text_table, with_error
 
 VERDICTS = {

@@ -12,15 +12,15 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.special import ndtri
 
-from fitmat.likelihood import Data, prepare, residuals
-from fitmat.losses import DEFAULT
+from fitmat.fitting.likelihood import Data, prepare, residuals
+from fitmat.fitting.losses import DEFAULT
+from fitmat.fitting.result import Fit
+from fitmat.fitting.stabilising import from_stabilised, stabilised
 from fitmat.maths.directions import from_angles
 from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF, evaluate, evaluate_pairs
 from fitmat.models.parameters import with_vector
-from fitmat.outcome import Fit
 from fitmat.posterior import Posterior
-from fitmat.stabilising import from_stabilised, stabilised
 
 BAND_DRAWS = 200
 

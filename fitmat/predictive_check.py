@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Array
 
 from fitmat.errors import FitmatError
-from fitmat.likelihood import Data, inferred_noise, mapped
-from fitmat.losses import DEFAULT
+from fitmat.fitting.likelihood import Data, inferred_noise, mapped
+from fitmat.fitting.losses import DEFAULT
 from fitmat.measurements.incidences import incidences
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.parameters import with_vector

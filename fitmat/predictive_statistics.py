@@ -12,11 +12,11 @@ import numpy as np
 from jaxtyping import Float
 from scipy import stats
 
-from fitmat.losses import DEFAULT
+from fitmat.fitting.losses import DEFAULT
+from fitmat.fitting.result import Fit
+from fitmat.fitting.stabilising import from_stabilised
 from fitmat.measurements.incidences import Incidence
 from fitmat.measurements.noise import curves
-from fitmat.outcome import Fit
-from fitmat.stabilising import from_stabilised
 
 REPLICATES = 4000
 """Patterns that are drawn to judge one."""

@@ -12,13 +12,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.fitting import Chart
-from fitmat.information import expected_information, inverse_information
-from fitmat.likelihood import Data, every_residual, mapped
+from fitmat.fitting.fitting import Chart
+from fitmat.fitting.information import expected_information, inverse_information
+from fitmat.fitting.likelihood import Data, every_residual, mapped
+from fitmat.fitting.result import Fit
 from fitmat.maths.least_squares import least_squares
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.parameters import space, vector, with_vector
-from fitmat.outcome import Fit
 
 STEPS = 16
 """Points on either side of the best value."""

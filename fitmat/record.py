@@ -6,13 +6,13 @@ It computes nothing; numbers that are not finite become null.
 from importlib.metadata import version
 from typing import Any
 
-from fitmat import priors
 from fitmat.choice import Choice
 from fitmat.comparison import Comparison
 from fitmat.estimate import Estimate
+from fitmat.fitting import priors
+from fitmat.fitting.result import RESULTS
 from fitmat.identifiability import Identifiability
 from fitmat.metrics import fit_metrics
-from fitmat.outcome import RESULTS
 from fitmat.posterior import Posterior
 from fitmat.sphere import Perceived, Spread
 from fitmat.study import Study

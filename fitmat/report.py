@@ -18,16 +18,17 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from fitmat import plots, priors, record
+from fitmat import plots, record
 from fitmat.ablation import EXPLAINS, TERMS
 from fitmat.choice import Choice
 from fitmat.comparison import Comparison
 from fitmat.distances import METRICS
+from fitmat.fitting import priors
+from fitmat.fitting.result import RESULTS, Fit
 from fitmat.headline import CLOSE, SIMILAR
 from fitmat.measurements.samples import Measurements
 from fitmat.metrics import fit_metrics
 from fitmat.models.parameters import space
-from fitmat.outcome import RESULTS, Fit
 from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS, Posterior
 from fitmat.prediction import sections
 from fitmat.regions import GRAZING_DEG, REGIONS

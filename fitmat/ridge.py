@@ -11,9 +11,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import PchipInterpolator
 
+from fitmat.fitting.priors import natural_sd
+from fitmat.fitting.result import Fit
 from fitmat.models.parameters import space
-from fitmat.outcome import Fit
-from fitmat.priors import natural_sd
 from fitmat.profile_likelihood import STEPS, Profile, along
 
 NODES = 4 * STEPS

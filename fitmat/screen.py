@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fitmat.console import MOST_SAMPLED
-from fitmat.outcome import RESULTS
+from fitmat.fitting.result import RESULTS
 from fitmat.posterior import Posterior
 from fitmat.report import rows
 from fitmat.study import Study, detailed

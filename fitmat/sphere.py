@@ -18,7 +18,7 @@ from scipy.ndimage import map_coordinates
 
 from fitmat import scene
 from fitmat.estimate import Estimate, estimate
-from fitmat.likelihood import mapped
+from fitmat.fitting.likelihood import mapped
 from fitmat.maths.directions import zenith
 from fitmat.models.around.instrument import surface
 from fitmat.models.base import AbstractBRDF, evaluate_pairs

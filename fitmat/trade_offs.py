@@ -10,9 +10,9 @@ from fractions import Fraction
 import numpy as np
 from jaxtyping import Float
 
+from fitmat.fitting.priors import natural_sd
+from fitmat.fitting.result import Fit
 from fitmat.models.terms.fresnel import f0_from_eta, f0_from_ior
-from fitmat.outcome import Fit
-from fitmat.priors import natural_sd
 from fitmat.profile_likelihood import free_names
 
 CONDITION = 30.0

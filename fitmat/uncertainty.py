@@ -16,7 +16,7 @@ from fitmat.approximation import draws, independent_proposal, laplace
 from fitmat.checkpoint import Checkpoint, Saved, digest
 from fitmat.density import default_walkers, log_posterior, physical
 from fitmat.errors import FitmatError, OutputError
-from fitmat.outcome import Fit
+from fitmat.fitting.result import Fit
 from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, Diagnostics, Posterior, split_rhat
 
 CHUNK = 50

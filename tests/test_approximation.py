@@ -10,7 +10,7 @@ from scipy import integrate, stats
 import fitmat as fm
 from fitmat.approximation import LAPLACE_DRAWS, MOST_CORRECTED, heavy_tailed, smoothed
 from fitmat.density import log_posterior
-from fitmat.outcome import Fit
+from fitmat.fitting.result import Fit
 from fitmat.posterior import GOOD_PARETO, VERDICTS, Posterior
 from fitmat.summary import parameters
 

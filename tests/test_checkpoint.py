@@ -16,9 +16,9 @@ import pytest
 import fitmat as fm
 from fitmat import checkpoint, uncertainty
 from fitmat.errors import FitmatError, OutputError
-from fitmat.outcome import Fit
+from fitmat.fitting.priors import prepared
+from fitmat.fitting.result import Fit
 from fitmat.posterior import Posterior
-from fitmat.priors import prepared
 from fitmat.uncertainty import CHUNK, resumable_steps
 
 STEPS = 250

@@ -15,8 +15,8 @@ from fitmat.choice import Candidate, Choice
 from fitmat.crossvalidation import MOST_REFITTED, leave_incidences_out
 from fitmat.errors import FitmatError
 from fitmat.evidence import MOST_LEFT_OUT, Evidence, weigh
+from fitmat.fitting.result import Fit
 from fitmat.models.lobes.lambert import Lambert
-from fitmat.outcome import Fit
 from fitmat.plausibility import broken_laws, doubts
 from fitmat.posterior import Posterior
 

@@ -16,7 +16,7 @@ from fitmat.candidates import Limits, proposed
 from fitmat.design import Design, Proposal
 from fitmat.errors import FitmatError, OutputError
 from fitmat.filter_bank import _assimilated
-from fitmat.outcome import Fit
+from fitmat.fitting.result import Fit
 
 CATALOGUE = Path(__file__).parents[1] / "data" / "synthetic"
 

@@ -11,12 +11,12 @@ import pytest
 from scipy.optimize import least_squares
 
 import fitmat as fm
+from fitmat.fitting.likelihood import every_residual
+from fitmat.fitting.priors import natural_sd
+from fitmat.fitting.result import Fit
 from fitmat.identifiability import CONTRACTED, STATES, Identifiability, identify
-from fitmat.likelihood import every_residual
 from fitmat.models.parameters import space, with_vector
-from fitmat.outcome import Fit
 from fitmat.posterior import Posterior
-from fitmat.priors import natural_sd
 from fitmat.profile_likelihood import Profile, profiles
 from fitmat.ridge import ridge
 

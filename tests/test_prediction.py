@@ -7,7 +7,7 @@ import pytest
 from oracles import ggx
 
 import fitmat as fm
-from fitmat.outcome import Fit
+from fitmat.fitting.result import Fit
 from fitmat.posterior import Posterior
 from fitmat.prediction import Section, curve, predictive_band, sections
 

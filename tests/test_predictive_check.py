@@ -8,8 +8,8 @@ from scipy import stats
 
 import fitmat as fm
 from fitmat.errors import FitmatError
+from fitmat.fitting.result import Fit
 from fitmat.measurements.incidences import incidences
-from fitmat.outcome import Fit
 from fitmat.posterior import Posterior
 from fitmat.predictive_check import PredictiveCheck, check_predictions
 

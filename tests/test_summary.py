@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import fitmat as fm
-from fitmat.outcome import Fit
+from fitmat.fitting.result import Fit
 from fitmat.posterior import Posterior
 from fitmat.summary import Quantity, derived, parameters
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import fitmat as fm
+from fitmat.fitting.result import Fit
 from fitmat.models.parameters import vector
-from fitmat.outcome import Fit
 from fitmat.telling import ROWS, SEPARATED, Telling, tell_apart
 
 CHANCE = 0.005

@@ -13,9 +13,9 @@ from scipy import stats
 import fitmat as fm
 from fitmat.density import log_posterior
 from fitmat.errors import FitmatError
-from fitmat.likelihood import log_likelihood, noise_scale
+from fitmat.fitting.likelihood import log_likelihood, noise_scale
+from fitmat.fitting.result import Fit
 from fitmat.models.parameters import space, vector, with_vector
-from fitmat.outcome import Fit
 from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, Diagnostics, Posterior, split_rhat
 from fitmat.uncertainty import CHUNK
 

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.information import UNDETERMINED, inverse_information
+from fitmat.fitting.information import UNDETERMINED, inverse_information
 from fitmat.measurements.noise import noise_law
 from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
@@ -70,7 +70,7 @@ def prospects(m: Measurements, sigma: Float[np.ndarray, "n c"], *, known: bool) 
     """The standard deviations that fits to such a file would have if the sample were one of `GLOSSES`.
 
     From I = Jᵀ Σ⁻¹ J at the true parameters (the Cramér–Rao bound), in natural coordinates, for the channel with most
-    valid samples. Limits of "not determined" are those of a fit, `outcome.UNDETERMINED`.
+    valid samples. Limits of "not determined" are those of a fit, `result.UNDETERMINED`.
 
     Args:
         m: Gives the directions.

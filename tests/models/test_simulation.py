@@ -12,7 +12,8 @@ import pytest
 
 from fitmat.errors import FitmatError, ModelError, OutputError
 from fitmat.files import write_text
-from fitmat.fitting import fit
+from fitmat.fitting.fitting import fit
+from fitmat.fitting.result import Fit
 from fitmat.measurements.formats import csv
 from fitmat.measurements.reader import read
 from fitmat.measurements.samples import from_arrays
@@ -20,7 +21,6 @@ from fitmat.models.base import AbstractBRDF, evaluate
 from fitmat.models.catalogue import MATERIALS, Material, write_catalogue
 from fitmat.models.registry import model
 from fitmat.models.simulation import simulate
-from fitmat.outcome import Fit
 
 FOLDER = pathlib.Path(__file__).parents[2] / "data" / "synthetic"
 NAMES = {material.name: material for material in MATERIALS}

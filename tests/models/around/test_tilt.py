@@ -10,11 +10,11 @@ from scipy.optimize import root_scalar
 from scipy.spatial.transform import Rotation
 
 import fitmat as fm
+from fitmat.fitting.result import Fit
 from fitmat.maths.directions import from_angles
 from fitmat.models.around.tilt import Tilted
 from fitmat.models.base import evaluate_pairs
 from fitmat.models.parameters import entries, space, vector, with_vector
-from fitmat.outcome import Fit
 
 EXACT = 1e-9
 """Relative; two ways to turn a vector differ by 1e-16, which a lobe of alpha 0.05 multiplies at grazing angles."""

@@ -11,10 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.likelihood import Data
+from fitmat.fitting.likelihood import Data
+from fitmat.fitting.stabilising import spread, stabilised
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.parameters import Entry, entries, vector, with_vector
-from fitmat.stabilising import spread, stabilised
 
 MAX_ROWS = 4000
 """The grid looks at no more rows than this, evenly spread over the file."""

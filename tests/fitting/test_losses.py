@@ -13,8 +13,8 @@ from scipy.optimize import curve_fit
 
 import fitmat as fm
 from fitmat.errors import FitmatError, ModelError
-from fitmat.likelihood import Data, log_likelihood, prepare
-from fitmat.losses import BAD_SHARE, BAD_SPREAD, LOSSES, T_DOF, bad_probability, loss
+from fitmat.fitting.likelihood import Data, log_likelihood, prepare
+from fitmat.fitting.losses import BAD_SHARE, BAD_SPREAD, LOSSES, T_DOF, bad_probability, loss
 from fitmat.measurements.noise import measured_noise
 from fitmat.models.around.noise import Noisy
 from fitmat.models.base import AbstractBRDF, evaluate

@@ -15,7 +15,7 @@ from jaxtyping import ArrayLike, Float
 from scipy.stats import truncnorm
 
 from fitmat.errors import ModelError
-from fitmat.likelihood import Prior
+from fitmat.fitting.likelihood import Prior
 from fitmat.measurements.instrument import Instrument
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import Entry, entries, space, vector

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import fitmat as fm
-from fitmat.conditions import of_material, prepared, tilted
 from fitmat.errors import ModelError
+from fitmat.fitting.known import of_material, prepared, tilted
 from fitmat.models.simulation import simulate
 
 JOHNSON_CHRISTY = 2e-2

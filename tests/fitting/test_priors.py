@@ -6,8 +6,8 @@ import pytest
 from scipy import stats
 
 import fitmat as fm
-from fitmat import priors
 from fitmat.errors import ModelError
+from fitmat.fitting import priors
 from fitmat.measurements.instrument import IDEAL
 from fitmat.models.parameters import entries, space
 

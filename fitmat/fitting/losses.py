@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Array
 
 from fitmat.errors import ModelError
+from fitmat.fitting.stabilising import spread, stabilised
 from fitmat.measurements.samples import Measurements
-from fitmat.stabilising import spread, stabilised
 
 Transform = Callable[[Array, Array, Array, Array], Array]
 """(x, noise, kappa, s) → T(x): x = f κ, noise = σ κ, kappa = cosθ_i, s the discrepancy; elementwise."""
@@ -208,7 +208,7 @@ def _up_to_80(m: Measurements) -> np.ndarray:
 
 
 DEFAULT = Loss("default", "z(y c_i) − z(f c_i)", "measurement noise and the model's own misfit, inferred together",
-    "fitmat.stabilising", _default, _default_spread, infers="discrepancy")  # fmt: skip
+    "fitmat.fitting.stabilising", _default, _default_spread, infers="discrepancy")  # fmt: skip
 
 _EVERY = (
     DEFAULT,

@@ -18,13 +18,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat._types import Directions, Samples, Scalar
-from fitmat.losses import DEFAULT, Loss
+from fitmat.fitting.losses import DEFAULT, Loss
+from fitmat.fitting.stabilising import spread
 from fitmat.measurements.noise import Noise, levels
 from fitmat.measurements.samples import Measurements
 from fitmat.models.around.noise import Noisy
 from fitmat.models.base import AbstractBRDF, evaluate_pairs, padded_length
 from fitmat.models.parameters import space, vector
-from fitmat.stabilising import spread
 
 
 class Prior(eqx.Module):

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import fitmat as fm
+from fitmat.fitting.result import Fit
 from fitmat.models.laws import example
 from fitmat.models.registry import LOBES
-from fitmat.outcome import Fit
 
 SIGMAS = 3.5
 """Standard deviations that a seeded estimate may be off: 1 in 2,000 for each of some 150 parameters and fixed seeds."""

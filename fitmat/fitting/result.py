@@ -13,9 +13,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.information import FOLLOWS, MISSES, covariance, information
-from fitmat.likelihood import Data, best_discrepancy, first_discrepancy, noise_scale
-from fitmat.losses import DEFAULT, Loss
+from fitmat.fitting.information import FOLLOWS, MISSES, covariance, information
+from fitmat.fitting.likelihood import Data, best_discrepancy, first_discrepancy, noise_scale
+from fitmat.fitting.losses import DEFAULT, Loss
 from fitmat.measurements.noise import Noise
 from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF, evaluate_pairs

@@ -13,15 +13,15 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
-from fitmat import fitting
-from fitmat.information import FOLLOWS, covariance, expected_information, is_positive, observed_information
-from fitmat.likelihood import NEGLIGIBLE, Data, noise_scale
+from fitmat.fitting import fitting
+from fitmat.fitting.information import FOLLOWS, covariance, expected_information, is_positive, observed_information
+from fitmat.fitting.likelihood import NEGLIGIBLE, Data, noise_scale
+from fitmat.fitting.result import Fit, named_outcome
+from fitmat.fitting.streamed_sums import Sums, block_sums, blocks, prior_sums
 from fitmat.measurements.large.noise import Scatter, scatter
 from fitmat.measurements.large.stream import Progress, Rows
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import space, vector, with_vector
-from fitmat.outcome import Fit, named_outcome
-from fitmat.sums import Sums, block_sums, blocks, prior_sums
 
 T = TypeVar("T")
 

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.likelihood import Data, every_residual, noise_scale, residuals
+from fitmat.fitting.likelihood import Data, every_residual, noise_scale, residuals
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import entries, space, vector, with_vector
 

@@ -10,10 +10,10 @@ from hypothesis.extra import numpy as hnp
 from scipy.optimize import nnls
 
 import fitmat as fm
-from fitmat.likelihood import Data, prepare
+from fitmat.fitting.likelihood import Data, prepare
+from fitmat.fitting.starts import nonnegative, starting_points
 from fitmat.measurements.noise import measured_noise
 from fitmat.models.parameters import entries
-from fitmat.starts import nonnegative, starting_points
 
 OBJECTIVE = 1e-3
 """Of |b|²: how much more than scipy may be left; coordinate descent ends within about 1/sweeps = 1/300 in the worst

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.likelihood import Data, discrepancy_cost, log_likelihood, prepare, prior_residuals, residuals
+from fitmat.fitting.likelihood import Data, discrepancy_cost, log_likelihood, prepare, prior_residuals, residuals
 from fitmat.measurements.noise import Noise
 from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy import integrate, optimize, stats
 
 import fitmat as fm
-from fitmat.likelihood import (
+from fitmat.fitting.likelihood import (
     NEGLIGIBLE,
     Data,
     best_discrepancy,
@@ -24,8 +24,8 @@ from fitmat.likelihood import (
     prepare,
     residuals,
 )
+from fitmat.fitting.stabilising import from_stabilised, spread, stabilised
 from fitmat.measurements.noise import Noise
-from fitmat.stabilising import from_stabilised, spread, stabilised
 
 QUADRATURE = 1e-9
 """Relative; quad is asked for 1e-11."""

@@ -14,7 +14,7 @@ import optimistix as optx
 from jaxtyping import Array, ArrayLike
 
 from fitmat.errors import FitmatError, ModelError
-from fitmat.likelihood import (
+from fitmat.fitting.likelihood import (
     Data,
     best_discrepancy,
     every_residual,
@@ -24,8 +24,11 @@ from fitmat.likelihood import (
     prepare,
     transformed,
 )
-from fitmat.losses import DEFAULT
-from fitmat.losses import loss as find_loss
+from fitmat.fitting.losses import DEFAULT
+from fitmat.fitting.losses import loss as find_loss
+from fitmat.fitting.priors import prepared
+from fitmat.fitting.result import Ends, Fit, conclude, free_places
+from fitmat.fitting.starts import starting_points
 from fitmat.maths.least_squares import Minimum, Units, least_squares
 from fitmat.measurements.noise import measured_noise
 from fitmat.measurements.samples import Measurements
@@ -34,9 +37,6 @@ from fitmat.models.around.noise import LEAST_ABSOLUTE, Noisy
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.parameters import Space, check_range, entries, space, vector, with_vector
 from fitmat.models.registry import model
-from fitmat.outcome import Ends, Fit, conclude, free_places
-from fitmat.priors import prepared
-from fitmat.starts import starting_points
 
 STARTS = 6
 """How many of the best grid points are refined."""
@@ -74,8 +74,8 @@ def fit(
         to: A model name ("lambert+ggx"), or a model whose shapes and static choices are used.
         fixed: Parameters to hold, by name: `{"ks": 1.0}`.
         priors: What is known beforehand, by name: centre and standard deviation, `{"eta": (1.5, 0.05)}`; see
-            `fitmat.priors`.
-        loss: What is minimised, by name (`fitmat.losses`); only a likelihood supports a posterior.
+            `fitmat.fitting.priors`.
+        loss: What is minimised, by name (`fitmat.fitting.losses`); only a likelihood supports a posterior.
         masking: Static masking choice for the microfacet lobes of a named model.
         max_steps: Levenberg–Marquardt iterations per start and round.
 
