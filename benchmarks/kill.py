@@ -28,7 +28,7 @@ def child(folder: Path, out: Path, cache: Path) -> None:
     import jax
 
     import fitmat as fm
-    from fitmat.uncertainty import resumable_steps
+    from fitmat.uncertainty.chains import resumable_steps
 
     jax.config.update("jax_enable_x64", True)
     jax.config.update("jax_compilation_cache_dir", str(cache))

@@ -17,7 +17,7 @@ import machine
 import numpy as np
 
 import fitmat as fm
-from fitmat.nuts import AGREEING, SecondOpinion
+from fitmat.uncertainty.second_sampler import AGREEING, SecondOpinion
 
 HERE = Path(__file__).parent
 SYNTHETIC = ("dull-plastic", "no-sigma-rubber", "one-curve")

@@ -25,7 +25,7 @@ import numpy as np
 from peer import Problem
 
 import fitmat as fm
-from fitmat import density, uncertainty
+from fitmat.uncertainty import chains, density
 
 WALKERS = 32
 NAMES = ("kd", "ks", "ln alpha", "ln eta", "s")
@@ -68,7 +68,7 @@ def fitmats(found: fm.Fit, seed: int) -> Run:
 
 def exchanged(found: fm.Fit, seed: int, peer: Problem) -> Run:
     """`fitmat.sample` with the numpy likelihood in place of the compiled one."""
-    with mock.patch.object(uncertainty, "log_posterior", return_value=peer.log_posterior):
+    with mock.patch.object(chains, "log_posterior", return_value=peer.log_posterior):
         return fitmats(found, seed)
 
 

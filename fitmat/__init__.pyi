@@ -1,4 +1,3 @@
-from .approximation import laplace as laplace
 from .calibration import Calibration as Calibration
 from .calibration import calibrate as calibrate
 from .candidates import Limits as Limits
@@ -34,7 +33,6 @@ from .models.multiple_scattering.random_walk import evaluate_walk as evaluate_wa
 from .models.multiple_scattering.surface import Surface as Surface
 from .models.registry import model as model
 from .models.simulation import simulate as simulate
-from .nuts import check_posterior as check_posterior
 from .plots import plot_ablation as plot_ablation
 from .plots import plot_albedo as plot_albedo
 from .plots import plot_choice as plot_choice
@@ -45,7 +43,9 @@ from .plots import plot_left_out as plot_left_out
 from .plots import plot_residuals as plot_residuals
 from .plots import plot_section as plot_section
 from .plots import plot_spheres as plot_spheres
-from .posterior import Posterior as Posterior
 from .prediction import sections as sections
 from .predictive_check import check_predictions as check_predictions
-from .uncertainty import sample as sample
+from .uncertainty.chains import sample as sample
+from .uncertainty.laplace import laplace as laplace
+from .uncertainty.posterior import Posterior as Posterior
+from .uncertainty.second_sampler import check_posterior as check_posterior

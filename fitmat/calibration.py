@@ -17,7 +17,6 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Bool, Float, Int
 from scipy.stats import binomtest
 
-from fitmat.approximation import laplace
 from fitmat.errors import FitmatError
 from fitmat.fitting.fitting import fit
 from fitmat.fitting.likelihood import Data, log_likelihood, mapped
@@ -29,8 +28,9 @@ from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF, evaluate, evaluate_pairs
 from fitmat.models.parameters import entries, vector, with_vector
 from fitmat.models.registry import model
-from fitmat.posterior import Posterior
-from fitmat.uncertainty import sample
+from fitmat.uncertainty.chains import sample
+from fitmat.uncertainty.laplace import laplace
+from fitmat.uncertainty.posterior import Posterior
 from fitmat.uniformity import p_values
 
 DRAWS = 99

@@ -16,8 +16,8 @@ from fitmat.fitting.result import Fit
 from fitmat.measurements.samples import Measurements
 from fitmat.models.registry import LOBES
 from fitmat.plausibility import broken_laws, doubts
-from fitmat.posterior import Posterior
 from fitmat.text import html_table, text_table
+from fitmat.uncertainty.posterior import Posterior
 
 SMALL, SURE = 4.0, 2.0
 """A difference of elpd is clear from 4 on and beyond 2 standard errors (Sivula, Magnusson, Matamoros & Vehtari 2020:
@@ -197,7 +197,7 @@ def choose(posteriors: Sequence[Posterior], *, predicting: bool = True) -> Choic
     parameters on a bound or not determined.
 
     Args:
-        posteriors: By `uncertainty.sample`, or `approximation.laplace`; models whose fit is not finite are left out.
+        posteriors: By `chains.sample`, or `laplace.laplace`; models whose fit is not finite are left out.
         predicting: Whether to refit without each incidence.
 
     Raises:

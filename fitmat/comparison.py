@@ -16,7 +16,6 @@ from fitmat import headline
 from fitmat.ablation import Ablation, ablate
 from fitmat.distances import ANGLES, Distances, Values, measure_distances
 from fitmat.errors import FitmatError
-from fitmat.estimate import Estimate, band, estimate
 from fitmat.fitting.result import Fit
 from fitmat.headline import CLOSE as CLOSE
 from fitmat.headline import SIMILAR as SIMILAR
@@ -25,8 +24,9 @@ from fitmat.imitation import Imitation, imitate
 from fitmat.measurements.samples import Measurements
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
 from fitmat.models.registry import LOBES, lobe_names
-from fitmat.posterior import Posterior
 from fitmat.telling import Telling, tell_apart
+from fitmat.uncertainty.estimate import Estimate, band, estimate
+from fitmat.uncertainty.posterior import Posterior
 
 if TYPE_CHECKING:
     from fitmat.sphere import Perceived

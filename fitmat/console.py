@@ -17,7 +17,6 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
 
-from fitmat.approximation import laplace, laplace_each
 from fitmat.choice import every_model
 from fitmat.comparison import Comparison, compare, is_empirical, is_microfacet
 from fitmat.errors import ModelError
@@ -31,9 +30,10 @@ from fitmat.measurements.reader import read
 from fitmat.measurements.samples import Measurements
 from fitmat.models.parameters import entries
 from fitmat.models.registry import LOBES, lobe_names, model, normalised
-from fitmat.posterior import Posterior
 from fitmat.study import Study, concluded
-from fitmat.uncertainty import resumable_steps, sample
+from fitmat.uncertainty.chains import resumable_steps, sample
+from fitmat.uncertainty.laplace import laplace, laplace_each
+from fitmat.uncertainty.posterior import Posterior
 
 MOST_AT_ONCE = 100_000
 """Rows above which a fit passes over the data block by block."""

@@ -20,8 +20,8 @@ from fitmat.errors import FitmatError
 from fitmat.filter_bank import Bank, Task, bank, scores
 from fitmat.fitting.result import Fit
 from fitmat.measurements.noise import noise_law
-from fitmat.posterior import Posterior
 from fitmat.profile_likelihood import free_names
+from fitmat.uncertainty.posterior import Posterior
 
 APART = 4.9
 """Proposals differ by more than this, in degrees; to take one again there are repeats."""

@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 from fitmat.fitting.likelihood import Data, log_pointwise, mapped
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import with_vector
-from fitmat.posterior import GOOD_PARETO, Posterior
+from fitmat.uncertainty.posterior import GOOD_PARETO, Posterior
 
 DRAWS = 1000
 """Posterior draws behind the predictive densities."""

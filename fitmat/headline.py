@@ -6,9 +6,9 @@ It measures nothing and decides nothing that a named threshold does not.
 import math
 
 from fitmat.ablation import TERMS, Ablation
-from fitmat.estimate import Estimate
 from fitmat.regions import GRAZING_DEG
 from fitmat.telling import SEPARATED, Telling
+from fitmat.uncertainty.estimate import Estimate
 
 CLOSE, SIMILAR = 0.1, 0.3
 """Hemisphere distances up to which the verdict says "hardly differ" and "differ moderately"."""

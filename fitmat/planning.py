@@ -17,8 +17,8 @@ from fitmat.design import MATCH, Design, Proposal, next_angles
 from fitmat.errors import OutputError
 from fitmat.files import write_bytes
 from fitmat.models.parameters import space
-from fitmat.posterior import Posterior
 from fitmat.text import plain, text_table
+from fitmat.uncertainty.posterior import Posterior
 
 PICTURES = ("png", "svg", "pdf")
 DPI = 150

@@ -16,11 +16,11 @@ from fitmat.comparison import Comparison
 from fitmat.design import Design
 from fitmat.fitting.result import Fit
 from fitmat.maths.directions import signed_zenith
-from fitmat.posterior import Posterior
 from fitmat.prediction import Section, curve, predictive_band, standardised_residuals
 from fitmat.regions import REGIONS
 from fitmat.sphere import Perceived
 from fitmat.telling import SEPARATED, Telling
+from fitmat.uncertainty.posterior import Posterior
 
 # Okabe & Ito's palette, safe for colour-blind readers.
 BLACK, ORANGE, BLUE, GREEN, PURPLE = "#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7"

@@ -20,7 +20,7 @@ from fitmat.maths.directions import from_angles
 from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF, evaluate, evaluate_pairs
 from fitmat.models.parameters import with_vector
-from fitmat.posterior import Posterior
+from fitmat.uncertainty.posterior import Posterior
 
 BAND_DRAWS = 200
 

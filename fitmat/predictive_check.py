@@ -17,9 +17,9 @@ from fitmat.fitting.losses import DEFAULT
 from fitmat.measurements.incidences import incidences
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.parameters import with_vector
-from fitmat.posterior import Posterior
 from fitmat.predictive_statistics import Look, Statistic
 from fitmat.text import html_table, text_table
+from fitmat.uncertainty.posterior import Posterior
 
 DRAWS = 200
 """Posterior draws behind every p-value, where the file is not large."""

@@ -8,16 +8,16 @@ from typing import Any
 
 from fitmat.choice import Choice
 from fitmat.comparison import Comparison
-from fitmat.estimate import Estimate
 from fitmat.fitting import priors
 from fitmat.fitting.result import RESULTS
 from fitmat.identifiability import Identifiability
 from fitmat.metrics import fit_metrics
-from fitmat.posterior import Posterior
 from fitmat.sphere import Perceived, Spread
 from fitmat.study import Study
-from fitmat.summary import Quantity, derived, parameters
 from fitmat.text import plain
+from fitmat.uncertainty.estimate import Estimate
+from fitmat.uncertainty.posterior import Posterior
+from fitmat.uncertainty.quantities import Quantity, derived, parameters
 
 
 def to_dict(study: Study) -> dict[str, Any]:

@@ -29,15 +29,15 @@ from fitmat.headline import CLOSE, SIMILAR
 from fitmat.measurements.samples import Measurements
 from fitmat.metrics import fit_metrics
 from fitmat.models.parameters import space
-from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS, Posterior
 from fitmat.prediction import sections
 from fitmat.regions import GRAZING_DEG, REGIONS
 from fitmat.spectra import WHITE_LUMINANCE
 from fitmat.sphere import CLEARLY_VISIBLE, JUST_NOTICEABLE
 from fitmat.study import Study
-from fitmat.summary import derived, parameters
 from fitmat.telling import SEPARATED
 from fitmat.text import interval, with_error
+from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS, Posterior
+from fitmat.uncertainty.quantities import derived, parameters
 
 DPI = 96
 CHANNELS_DRAWN = 3

@@ -11,9 +11,9 @@ from rich.text import Text
 
 from fitmat.console import MOST_SAMPLED
 from fitmat.fitting.result import RESULTS
-from fitmat.posterior import Posterior
 from fitmat.report import rows
 from fitmat.study import Study, detailed
+from fitmat.uncertainty.posterior import Posterior
 
 
 def show(found: Study, folder: Path) -> None:

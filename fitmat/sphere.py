@@ -17,7 +17,6 @@ from jaxtyping import Array, Float
 from scipy.ndimage import map_coordinates
 
 from fitmat import scene
-from fitmat.estimate import Estimate, estimate
 from fitmat.fitting.likelihood import mapped
 from fitmat.maths.directions import zenith
 from fitmat.models.around.instrument import surface
@@ -25,6 +24,7 @@ from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.parameters import with_vector
 from fitmat.scene import Screen
 from fitmat.spectra import colouring, delta_e_2000, delta_e_itp, shown, to_srgb
+from fitmat.uncertainty.estimate import Estimate, estimate
 
 DRAWS = 40
 """Pairs of posterior draws behind every interval."""

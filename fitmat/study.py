@@ -10,9 +10,9 @@ from fitmat.adequacy import Doubts, doubted
 from fitmat.choice import Choice, choose
 from fitmat.comparison import Comparison
 from fitmat.identifiability import Identifiability, identify
-from fitmat.nuts import SecondOpinion, check_posterior
-from fitmat.posterior import Posterior
 from fitmat.predictive_check import PredictiveCheck, check_predictions
+from fitmat.uncertainty.posterior import Posterior
+from fitmat.uncertainty.second_sampler import SecondOpinion, check_posterior
 
 DETAILED = 4
 """Of more models than this, only so many are examined one by one: those of the match, then the best."""

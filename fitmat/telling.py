@@ -13,10 +13,10 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat.distances import Values
-from fitmat.estimate import Estimate, band, estimate
 from fitmat.fitting.result import Fit
 from fitmat.models.base import AbstractBRDF, evaluate_pairs, padded_length
 from fitmat.models.parameters import with_vector
+from fitmat.uncertainty.estimate import Estimate, band, estimate
 
 SEPARATED = 3.92
 """Separation d′ from which either model is mistaken for the other in less than 2.5 % of all measurements, 2 · 1.96."""

@@ -18,7 +18,7 @@ from fitmat.evidence import MOST_LEFT_OUT, Evidence, weigh
 from fitmat.fitting.result import Fit
 from fitmat.models.lobes.lambert import Lambert
 from fitmat.plausibility import broken_laws, doubts
-from fitmat.posterior import Posterior
+from fitmat.uncertainty.posterior import Posterior
 
 DENSITY = 0.02
 """Nats: of a Gaussian posterior of one parameter, 1000 draws give each value's log density to about its share of p_loo,

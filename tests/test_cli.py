@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from fitmat import cli, console
-from fitmat.uncertainty import CHUNK
+from fitmat.uncertainty.chains import CHUNK
 
 DATA = Path(__file__).parents[1] / "data" / "synthetic"
 HEAD = "theta_i,theta_o,brdf\n"

@@ -15,15 +15,15 @@ from fitmat.ablation import EXPLAINS, TERMS, Ablation
 from fitmat.comparison import ALBEDO_ANGLES, Comparison, compare
 from fitmat.distances import METRICS
 from fitmat.errors import FitmatError
-from fitmat.estimate import Estimate
 from fitmat.fitting.result import Fit
 from fitmat.imitation import Imitation
 from fitmat.metrics import fit_metrics
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha, fitted_alpha, fitted_exponent
-from fitmat.posterior import Posterior
 from fitmat.regions import GRAZING_DEG, REGIONS
 from fitmat.telling import SEPARATED, Telling
+from fitmat.uncertainty.estimate import Estimate
+from fitmat.uncertainty.posterior import Posterior
 
 EXACT = 1e-9
 """Relative; where both models are constant the quadrature cancels."""

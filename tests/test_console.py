@@ -10,8 +10,8 @@ import fitmat
 from fitmat import console, screen
 from fitmat.errors import ModelError
 from fitmat.models.simulation import simulate
-from fitmat.posterior import Posterior
 from fitmat.study import Study
+from fitmat.uncertainty.posterior import Posterior
 
 
 @pytest.fixture(scope="module")

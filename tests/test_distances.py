@@ -10,7 +10,6 @@ from scipy.integrate import dblquad, quad
 import fitmat as fm
 from fitmat.ablation import TERMS, Ablation, CosinePower, ablate, ablated
 from fitmat.distances import ANGLES, METRICS, Distances, measure_distances
-from fitmat.estimate import Estimate
 from fitmat.models.base import AbstractBRDF, Sum
 from fitmat.models.lobes.lambert import Lambert
 from fitmat.models.lobes.microfacet import Microfacet
@@ -18,6 +17,7 @@ from fitmat.models.parameters import vector
 from fitmat.models.terms.distributions import GGX, Isotropic
 from fitmat.models.terms.fresnel import White
 from fitmat.regions import REGIONS
+from fitmat.uncertainty.estimate import Estimate
 
 EXACT = 1e-9
 """Relative; where both models are constant over ω_o the quadrature cancels or is Gauss's for a polynomial."""

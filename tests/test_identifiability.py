@@ -16,9 +16,9 @@ from fitmat.fitting.priors import natural_sd
 from fitmat.fitting.result import Fit
 from fitmat.identifiability import CONTRACTED, STATES, Identifiability, identify
 from fitmat.models.parameters import space, with_vector
-from fitmat.posterior import Posterior
 from fitmat.profile_likelihood import Profile, profiles
 from fitmat.ridge import ridge
+from fitmat.uncertainty.posterior import Posterior
 
 CATALOGUE = Path(__file__).parents[1] / "data" / "synthetic"
 

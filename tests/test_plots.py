@@ -13,7 +13,7 @@ import fitmat
 from fitmat import console, plots, prediction
 from fitmat.comparison import Comparison, compare
 from fitmat.models.simulation import simulate
-from fitmat.posterior import Posterior
+from fitmat.uncertainty.posterior import Posterior
 
 NAMES = ["lambert+blinn-phong", "lambert+ggx"]
 

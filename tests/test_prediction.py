@@ -8,8 +8,8 @@ from oracles import ggx
 
 import fitmat as fm
 from fitmat.fitting.result import Fit
-from fitmat.posterior import Posterior
 from fitmat.prediction import Section, curve, predictive_band, sections
+from fitmat.uncertainty.posterior import Posterior
 
 FRESH = 40
 

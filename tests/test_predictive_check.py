@@ -10,8 +10,8 @@ import fitmat as fm
 from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
 from fitmat.measurements.incidences import incidences
-from fitmat.posterior import Posterior
 from fitmat.predictive_check import PredictiveCheck, check_predictions
+from fitmat.uncertainty.posterior import Posterior
 
 REPEATS = 60
 """Files that differ by their noise alone."""

@@ -12,10 +12,10 @@ from oracles import ggx
 
 import fitmat as fm
 from fitmat import plots, scene
-from fitmat.estimate import Estimate
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.parameters import vector
 from fitmat.sphere import Perceived, Spread, _spread, perceived
+from fitmat.uncertainty.estimate import Estimate
 
 EVEN = 3e-3
 """Relative; an even grid of 1500 × 1500 pixels has a jagged edge."""

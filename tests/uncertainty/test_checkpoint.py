@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 import fitmat as fm
-from fitmat import checkpoint, uncertainty
 from fitmat.errors import FitmatError, OutputError
 from fitmat.fitting.priors import prepared
 from fitmat.fitting.result import Fit
-from fitmat.posterior import Posterior
-from fitmat.uncertainty import CHUNK, resumable_steps
+from fitmat.uncertainty import chains, checkpoint
+from fitmat.uncertainty.chains import CHUNK, resumable_steps
+from fitmat.uncertainty.posterior import Posterior
 
 STEPS = 250
 """Of every run here: five parts."""
@@ -99,7 +99,7 @@ def steps(fit: Fit, folder: Path) -> int:
 def test_a_run_killed_twice_ends_with_the_same_chain(fit: Fit, whole: Posterior, tmp_path: Path) -> None:
     """Kill −9 of two processes; the third start, here, ends with the chain of a run that nobody killed."""
     folder = tmp_path / "kept"
-    code = CHILD.format(tests=str(Path(__file__).parent), folder=str(folder))
+    code = CHILD.format(tests=str(Path(__file__).parents[1]), folder=str(folder))
     for wanted in (1, 3):
         process = subprocess.Popen([sys.executable, "-c", code])
         end = time.monotonic() + PATIENCE
@@ -128,8 +128,8 @@ def test_a_resumed_run_remembers_how_far_it_wanted_to_go(
     fit: Fit, tmp_path: Path, every_chunk: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The first look asks for 200 steps, later ones for fewer."""
-    monkeypatch.setattr(uncertainty, "SHORTEST", CHUNK)
-    monkeypatch.setattr(uncertainty, "_steps_needed", lambda sampler: 200 if sampler.iteration == CHUNK else 0)
+    monkeypatch.setattr(chains, "SHORTEST", CHUNK)
+    monkeypatch.setattr(chains, "_steps_needed", lambda sampler: 200 if sampler.iteration == CHUNK else 0)
     first = run(fit, tmp_path)
     for part in parts(tmp_path)[2:]:
         part.unlink()
@@ -177,7 +177,7 @@ def test_checkpoints_of_another_run_are_refused(fit: Fit, kept: Path, monkeypatc
         assert resumable_steps(fit, checkpoint=kept, **given) == 0
         with pytest.raises(FitmatError, match=refused):
             fm.sample(fit, checkpoint=kept, **given)
-    monkeypatch.setattr(uncertainty.importlib.metadata, "version", lambda _: "0")
+    monkeypatch.setattr(chains.importlib.metadata, "version", lambda _: "0")
     assert steps(fit, kept) == 0
 
 

@@ -8,11 +8,11 @@ import pytest
 from scipy import integrate, stats
 
 import fitmat as fm
-from fitmat.approximation import LAPLACE_DRAWS, MOST_CORRECTED, heavy_tailed, smoothed
-from fitmat.density import log_posterior
 from fitmat.fitting.result import Fit
-from fitmat.posterior import GOOD_PARETO, VERDICTS, Posterior
-from fitmat.summary import parameters
+from fitmat.uncertainty.density import log_posterior
+from fitmat.uncertainty.laplace import LAPLACE_DRAWS, MOST_CORRECTED, heavy_tailed, smoothed
+from fitmat.uncertainty.posterior import GOOD_PARETO, VERDICTS, Posterior
+from fitmat.uncertainty.quantities import parameters
 
 EFFECTIVE = 1000
 """2000 draws from 4000 proposals of which about half count are worth at least so many independent ones."""
@@ -135,7 +135,7 @@ def test_a_gaussian_that_misses_the_posterior_is_said_to_be_approximate(near_bou
 
 def test_a_heavy_tail_of_the_weights_forbids_the_correction(near_bound: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
     """However many effective draws there seem to be."""
-    monkeypatch.setattr("fitmat.approximation.smoothed", lambda logs: (np.full(len(logs), 1 / len(logs)), 0.71))
+    monkeypatch.setattr("fitmat.uncertainty.laplace.smoothed", lambda logs: (np.full(len(logs), 1 / len(logs)), 0.71))
     found = fm.laplace(near_bound, seed=1)
     assert (found.verdict, found.pareto_k) == ("approximate", 0.71)
 

@@ -10,7 +10,7 @@ import numpy as np
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
 from fitmat.models.parameters import space
 from fitmat.models.terms.fresnel import eta_from_f0, f0_from_eta
-from fitmat.posterior import Posterior
+from fitmat.uncertainty.posterior import Posterior
 
 Z95 = 1.959964
 

@@ -11,13 +11,13 @@ import xarray
 from scipy import stats
 
 import fitmat as fm
-from fitmat.density import log_posterior
 from fitmat.errors import FitmatError
 from fitmat.fitting.likelihood import log_likelihood, noise_scale
 from fitmat.fitting.result import Fit
 from fitmat.models.parameters import space, vector, with_vector
-from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, Diagnostics, Posterior, split_rhat
-from fitmat.uncertainty import CHUNK
+from fitmat.uncertainty.chains import CHUNK
+from fitmat.uncertainty.density import log_posterior
+from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, Diagnostics, Posterior, split_rhat
 
 QUANTILE = 0.15
 """In standard deviations: three Monte Carlo errors, 2.7/√ESS, of an outer quantile from about 1600 effective draws,

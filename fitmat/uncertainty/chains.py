@@ -12,12 +12,12 @@ from typing import Any
 import jax
 import numpy as np
 
-from fitmat.approximation import draws, independent_proposal, laplace
-from fitmat.checkpoint import Checkpoint, Saved, digest
-from fitmat.density import default_walkers, log_posterior, physical
 from fitmat.errors import FitmatError, OutputError
 from fitmat.fitting.result import Fit
-from fitmat.posterior import ENOUGH_ESS, ENOUGH_TAU, Diagnostics, Posterior, split_rhat
+from fitmat.uncertainty.checkpoint import Checkpoint, Saved, digest
+from fitmat.uncertainty.density import default_walkers, log_posterior, physical
+from fitmat.uncertainty.laplace import draws, independent_proposal, laplace
+from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAU, Diagnostics, Posterior, split_rhat
 
 CHUNK = 50
 """Steps between looks at the autocorrelation time."""

@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.apparent import Apparent, apparent
-from fitmat.density import default_walkers, log_posterior, physical
 from fitmat.fitting import fitting
 from fitmat.fitting.information import inverse_information
 from fitmat.fitting.likelihood import noise_scale
 from fitmat.fitting.result import Fit
 from fitmat.measurements.samples import Measurements
 from fitmat.models.parameters import space
-from fitmat.posterior import GOOD_PARETO, Posterior
+from fitmat.uncertainty.density import default_walkers, log_posterior, physical
+from fitmat.uncertainty.posterior import GOOD_PARETO, Posterior
+from fitmat.uncertainty.scaled_weights import Apparent, apparent
 
 LAPLACE_DRAWS = 2000
 

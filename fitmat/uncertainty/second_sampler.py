@@ -13,15 +13,15 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.apparent import Apparent, apparent
-from fitmat.approximation import draws
-from fitmat.density import log_density_at, physical
 from fitmat.errors import FitmatError
 from fitmat.fitting.likelihood import mapped
 from fitmat.fitting.result import Fit
 from fitmat.models.parameters import space
-from fitmat.posterior import ENOUGH_ESS, GOOD_RHAT, Posterior
 from fitmat.text import html_table, text_table
+from fitmat.uncertainty.density import log_density_at, physical
+from fitmat.uncertainty.laplace import draws
+from fitmat.uncertainty.posterior import ENOUGH_ESS, GOOD_RHAT, Posterior
+from fitmat.uncertainty.scaled_weights import Apparent, apparent
 
 AGREEING = 4.0
 """Monte Carlo standard errors by which two numbers may differ by chance: 1 in 16,000 for a Gaussian."""
@@ -139,7 +139,7 @@ def check_posterior(
     Carpenter & Bürkner 2021, Bayesian Analysis 16), walkers counting as chains.
 
     Args:
-        posterior: From `uncertainty.sample`.
+        posterior: From `chains.sample`.
         seed: Of starts and moves.
         chains: Chains of NUTS, each from a draw of Laplace's approximation.
         warmup: Steps of each that adapt and are left out.

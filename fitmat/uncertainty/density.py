@@ -12,11 +12,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from fitmat.apparent import Apparent, apparent
 from fitmat.fitting.likelihood import Data, log_density, mapped, noise_scale
 from fitmat.fitting.result import Fit
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import space, vector, with_vector
+from fitmat.uncertainty.scaled_weights import Apparent, apparent
 
 
 def default_walkers(fit: Fit) -> int:

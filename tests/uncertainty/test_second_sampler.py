@@ -8,8 +8,8 @@ from scipy import stats
 
 import fitmat as fm
 from fitmat.errors import FitmatError
-from fitmat.nuts import AGREEING, SecondOpinion, compare_chains
-from fitmat.posterior import Posterior
+from fitmat.uncertainty.posterior import Posterior
+from fitmat.uncertainty.second_sampler import AGREEING, SecondOpinion, compare_chains
 
 
 def cut_off(loss: str) -> Posterior:
