@@ -23,7 +23,7 @@ import numpy as np
 import platformdirs
 
 import fitmat as fm
-from fitmat.calibration import Calibration, calibrate
+from fitmat.judgement.calibration import Calibration, calibrate
 
 NOISES = {"0.5 %": (0.005, 5e-4), "2 %": (0.02, 1e-3), "10 %": (0.1, 5e-3)}
 """Fraction of the value, and floor in sr⁻¹."""

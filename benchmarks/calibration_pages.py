@@ -12,8 +12,17 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from fitmat.calibration import DRAWS, FAMILY, LEVELS, LOG_LIKELIHOOD, Calibration, coverage_limits, join, rejected
-from fitmat.uniformity import band
+from fitmat.judgement.calibration import (
+    DRAWS,
+    FAMILY,
+    LEVELS,
+    LOG_LIKELIHOOD,
+    Calibration,
+    coverage_limits,
+    join,
+    rejected,
+)
+from fitmat.judgement.uniformity import band
 
 BAND = 0.95
 """Simultaneous coverage of the bands in the pictures."""

@@ -9,9 +9,9 @@ import os
 from pathlib import Path
 
 from fitmat.errors import OutputError
-from fitmat.examination import Examination, examine
 from fitmat.examination.plots import plot_examination
 from fitmat.files import write_bytes
+from fitmat.judgement.examination.examining import Examination, examine
 from fitmat.measurements.samples import Measurements
 
 PICTURES = ("png", "svg", "pdf")

@@ -13,9 +13,9 @@ from typing import Any, Literal
 import numpy as np
 
 from fitmat.comparison import is_microfacet
-from fitmat.design import MATCH, Design, Proposal, next_angles
 from fitmat.errors import OutputError
 from fitmat.files import write_bytes
+from fitmat.judgement.design.design import MATCH, Design, Proposal, next_angles
 from fitmat.models.parameters import space
 from fitmat.text import plain, text_table
 from fitmat.uncertainty.posterior import Posterior

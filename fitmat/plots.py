@@ -11,12 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fitmat.ablation import Ablation
-from fitmat.choice import SMALL, Choice
 from fitmat.comparison import Comparison
-from fitmat.design import Design
 from fitmat.fitting.result import Fit
+from fitmat.judgement.choice import SMALL, Choice
+from fitmat.judgement.design.design import Design
+from fitmat.judgement.prediction import Section, curve, predictive_band, standardised_residuals
 from fitmat.maths.directions import signed_zenith
-from fitmat.prediction import Section, curve, predictive_band, standardised_residuals
 from fitmat.regions import REGIONS
 from fitmat.sphere import Perceived
 from fitmat.telling import SEPARATED, Telling

@@ -6,12 +6,12 @@ It computes nothing; numbers that are not finite become null.
 from importlib.metadata import version
 from typing import Any
 
-from fitmat.choice import Choice
 from fitmat.comparison import Comparison
 from fitmat.fitting import priors
 from fitmat.fitting.result import RESULTS
-from fitmat.identifiability import Identifiability
-from fitmat.metrics import fit_metrics
+from fitmat.judgement.choice import Choice
+from fitmat.judgement.identifiability.verdicts import Identifiability
+from fitmat.judgement.metrics import fit_metrics
 from fitmat.sphere import Perceived, Spread
 from fitmat.study import Study
 from fitmat.text import plain

@@ -20,16 +20,16 @@ from matplotlib.figure import Figure
 
 from fitmat import plots, record
 from fitmat.ablation import EXPLAINS, TERMS
-from fitmat.choice import Choice
 from fitmat.comparison import Comparison
 from fitmat.distances import METRICS
 from fitmat.fitting import priors
 from fitmat.fitting.result import RESULTS, Fit
 from fitmat.headline import CLOSE, SIMILAR
+from fitmat.judgement.choice import Choice
+from fitmat.judgement.metrics import fit_metrics
+from fitmat.judgement.prediction import sections
 from fitmat.measurements.samples import Measurements
-from fitmat.metrics import fit_metrics
 from fitmat.models.parameters import space
-from fitmat.prediction import sections
 from fitmat.regions import GRAZING_DEG, REGIONS
 from fitmat.spectra import WHITE_LUMINANCE
 from fitmat.sphere import CLEARLY_VISIBLE, JUST_NOTICEABLE

@@ -17,7 +17,7 @@ from fitmat.distances import METRICS
 from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
 from fitmat.imitation import Imitation
-from fitmat.metrics import fit_metrics
+from fitmat.judgement.metrics import fit_metrics
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha, fitted_alpha, fitted_exponent
 from fitmat.regions import GRAZING_DEG, REGIONS

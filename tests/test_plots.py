@@ -10,8 +10,9 @@ from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
 import fitmat
-from fitmat import console, plots, prediction
+from fitmat import console, plots
 from fitmat.comparison import Comparison, compare
+from fitmat.judgement import prediction
 from fitmat.models.simulation import simulate
 from fitmat.uncertainty.posterior import Posterior
 

@@ -3,5 +3,5 @@
 It fits nothing and changes nothing.
 """
 
-from fitmat.examination.examining import Examination as Examination
-from fitmat.examination.examining import examine as examine
+from fitmat.judgement.examination.examining import Examination as Examination
+from fitmat.judgement.examination.examining import examine as examine

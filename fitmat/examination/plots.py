@@ -12,9 +12,9 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure, SubFigure
 
-from fitmat.examination.coverage import Incidence
-from fitmat.examination.examining import Examination
-from fitmat.examination.features import in_plane_curve
+from fitmat.judgement.examination.coverage import Incidence
+from fitmat.judgement.examination.examining import Examination
+from fitmat.judgement.examination.features import in_plane_curve
 
 BESIDE = 4
 """So many maps stand in one row; more stand in rows of three."""

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from scipy.spatial import KDTree
 from scipy.stats import chi2
 
-from fitmat.examination.coverage import settled
+from fitmat.judgement.examination.coverage import settled
 from fitmat.measurements.samples import IN_PLANE, Measurements
 
 TOLERANCE = (np.deg2rad(0.01), np.deg2rad(0.5))

@@ -14,10 +14,10 @@ from jaxtyping import Array, Float
 from fitmat.fitting.likelihood import mapped
 from fitmat.fitting.losses import Loss
 from fitmat.fitting.result import Fit
+from fitmat.judgement.identifiability.profiles import profiles
+from fitmat.judgement.identifiability.ridge import Ridge, ridge
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import space, with_vector
-from fitmat.profile_likelihood import profiles
-from fitmat.ridge import Ridge, ridge
 
 TRUTHS = 16
 """Points of the ridge that are taken for the truth, equally likely."""

@@ -14,13 +14,13 @@ import fitmat as fm
 from fitmat.fitting.likelihood import every_residual
 from fitmat.fitting.priors import natural_sd
 from fitmat.fitting.result import Fit
-from fitmat.identifiability import CONTRACTED, STATES, Identifiability, identify
+from fitmat.judgement.identifiability.profiles import Profile, profiles
+from fitmat.judgement.identifiability.ridge import ridge
+from fitmat.judgement.identifiability.verdicts import CONTRACTED, STATES, Identifiability, identify
 from fitmat.models.parameters import space, with_vector
-from fitmat.profile_likelihood import Profile, profiles
-from fitmat.ridge import ridge
 from fitmat.uncertainty.posterior import Posterior
 
-CATALOGUE = Path(__file__).parents[1] / "data" / "synthetic"
+CATALOGUE = Path(__file__).parents[2] / "data" / "synthetic"
 
 LOCAL = 0.05
 """Relative: how far a profile's width may be from Laplace's where the noise is 2 %, so that curvature hardly counts."""

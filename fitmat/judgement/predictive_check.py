@@ -14,10 +14,10 @@ from jaxtyping import Array
 from fitmat.errors import FitmatError
 from fitmat.fitting.likelihood import Data, inferred_noise, mapped
 from fitmat.fitting.losses import DEFAULT
+from fitmat.judgement.predictive_statistics import Look, Statistic
 from fitmat.measurements.incidences import incidences
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.parameters import with_vector
-from fitmat.predictive_statistics import Look, Statistic
 from fitmat.text import html_table, text_table
 from fitmat.uncertainty.posterior import Posterior
 

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.examination import finding_words, words
-from fitmat.examination.consistency import Agreement, Consistency, consistency
-from fitmat.examination.coverage import Coverage, coverage, mirror_frame
-from fitmat.examination.features import Level, Peak, Tilt, level, peak, tilt
-from fitmat.examination.implied_albedo import ImpliedAlbedo, implied_albedo
-from fitmat.examination.phrases import Said
-from fitmat.examination.prospects import ASSUMED, Prospect, prospects
-from fitmat.examination.value_range import ValueRange, value_range
+from fitmat.judgement.examination import finding_words, words
+from fitmat.judgement.examination.consistency import Agreement, Consistency, consistency
+from fitmat.judgement.examination.coverage import Coverage, coverage, mirror_frame
+from fitmat.judgement.examination.features import Level, Peak, Tilt, level, peak, tilt
+from fitmat.judgement.examination.implied_albedo import ImpliedAlbedo, implied_albedo
+from fitmat.judgement.examination.phrases import Said
+from fitmat.judgement.examination.prospects import ASSUMED, Prospect, prospects
+from fitmat.judgement.examination.value_range import ValueRange, value_range
 from fitmat.measurements.noise import Noise, measured_noise, noise_law
 from fitmat.measurements.samples import Measurements
 from fitmat.text import plain

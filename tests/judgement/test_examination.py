@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import fitmat as fm
-from fitmat.examination.coverage import coverage, mirror_frame
-from fitmat.examination.examining import Examination, examine
-from fitmat.examination.features import peak
-from fitmat.examination.implied_albedo import implied_albedo
-from fitmat.examination.prospects import prospects
+from fitmat.judgement.examination.coverage import coverage, mirror_frame
+from fitmat.judgement.examination.examining import Examination, examine
+from fitmat.judgement.examination.features import peak
+from fitmat.judgement.examination.implied_albedo import implied_albedo
+from fitmat.judgement.examination.prospects import prospects
 from fitmat.measurements.noise import noise_law
 
 SEEDS = 20
@@ -344,7 +344,7 @@ def test_prospects_are_the_inverse_of_the_fisher_information() -> None:
 
 def test_what_the_catalogue_calls_not_determined_is_not() -> None:
     """The truth beside `normal-incidence.csv`: weight and index act alike at normal incidence."""
-    folder = Path(__file__).parents[1] / "data" / "synthetic"
+    folder = Path(__file__).parents[2] / "data" / "synthetic"
     stated = json.loads((folder / "normal-incidence.truth.json").read_text(encoding="utf-8"))["not_determined"]
     found = examine(fm.read(folder / "normal-incidence.csv"))
     glossy = [p for p in found.prospects if (p.model, p.gloss) == ("lambert+ggx", "glossy")]

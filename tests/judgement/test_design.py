@@ -12,13 +12,13 @@ from PIL import Image
 
 import fitmat as fm
 from fitmat import planning
-from fitmat.candidates import Limits, proposed
-from fitmat.design import Design, Proposal
 from fitmat.errors import FitmatError, OutputError
-from fitmat.filter_bank import _assimilated
 from fitmat.fitting.result import Fit
+from fitmat.judgement.design.candidates import Limits, proposed
+from fitmat.judgement.design.design import Design, Proposal
+from fitmat.judgement.design.filters import _assimilated
 
-CATALOGUE = Path(__file__).parents[1] / "data" / "synthetic"
+CATALOGUE = Path(__file__).parents[2] / "data" / "synthetic"
 
 HOLDS = 0.25
 """Relative: a standard deviation after a measurement is predicted at least so well."""

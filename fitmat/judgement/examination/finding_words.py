@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fitmat.examination import phrases as say
-from fitmat.examination.features import DEEP, Level, Peak, Tilt
-from fitmat.examination.implied_albedo import ImpliedAlbedo
-from fitmat.examination.phrases import Said
-from fitmat.examination.prospects import Prospect
+from fitmat.judgement.examination import phrases as say
+from fitmat.judgement.examination.features import DEEP, Level, Peak, Tilt
+from fitmat.judgement.examination.implied_albedo import ImpliedAlbedo
+from fitmat.judgement.examination.phrases import Said
+from fitmat.judgement.examination.prospects import Prospect
 from fitmat.text import with_error
 
 VAGUE = np.deg2rad(5.0)

@@ -11,13 +11,13 @@ from jaxtyping import Array
 from scipy import stats
 
 import fitmat as fm
-from fitmat.choice import Candidate, Choice
-from fitmat.crossvalidation import MOST_REFITTED, leave_incidences_out
 from fitmat.errors import FitmatError
-from fitmat.evidence import MOST_LEFT_OUT, Evidence, weigh
 from fitmat.fitting.result import Fit
+from fitmat.judgement.choice import Candidate, Choice
+from fitmat.judgement.evidence import MOST_LEFT_OUT, Evidence, weigh
+from fitmat.judgement.left_out import MOST_REFITTED, leave_incidences_out
+from fitmat.judgement.plausibility import broken_laws, doubts
 from fitmat.models.lobes.lambert import Lambert
-from fitmat.plausibility import broken_laws, doubts
 from fitmat.uncertainty.posterior import Posterior
 
 DENSITY = 0.02

@@ -13,9 +13,9 @@ from scipy.stats import norm
 from fitmat.fitting.information import MISSES
 from fitmat.fitting.losses import bad_probability
 from fitmat.fitting.result import Fit
+from fitmat.judgement.prediction import standardised_residuals
 from fitmat.maths.directions import signed_zenith
 from fitmat.measurements.noise import leave_one_out
-from fitmat.prediction import standardised_residuals
 
 CHANCE = 1e-3
 """Probability, over all values of a file together, from which on a deviation is not put down to chance."""

@@ -11,11 +11,11 @@ from jaxtyping import Float
 from fitmat.fitting.information import UNDETERMINED
 from fitmat.fitting.priors import natural_sd
 from fitmat.fitting.result import Fit
+from fitmat.judgement.identifiability.profiles import Profile, profiles
+from fitmat.judgement.identifiability.ridge import Ridge, ridge
+from fitmat.judgement.identifiability.trade_offs import Group, groups
 from fitmat.models.parameters import space
-from fitmat.profile_likelihood import Profile, profiles
-from fitmat.ridge import Ridge, ridge
 from fitmat.text import html_table, interval, text_table, with_error
-from fitmat.trade_offs import Group, groups
 from fitmat.uncertainty.posterior import Posterior
 
 DRAWS = 4000

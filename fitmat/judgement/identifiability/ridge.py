@@ -13,8 +13,8 @@ from scipy.interpolate import PchipInterpolator
 
 from fitmat.fitting.priors import natural_sd
 from fitmat.fitting.result import Fit
+from fitmat.judgement.identifiability.profiles import STEPS, Profile, along
 from fitmat.models.parameters import space
-from fitmat.profile_likelihood import STEPS, Profile, along
 
 NODES = 4 * STEPS
 """Gaussians on the ridge, fewer only for a single parameter."""

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import Delaunay, QhullError
 
-from fitmat.examination.coverage import Incidence
+from fitmat.judgement.examination.coverage import Incidence
 from fitmat.measurements.samples import IN_PLANE, Measurements
 
 ENOUGH = 0.8

@@ -9,13 +9,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fitmat.crossvalidation import LeftOut, leave_incidences_out
 from fitmat.errors import FitmatError
-from fitmat.evidence import Evidence, weigh
 from fitmat.fitting.result import Fit
+from fitmat.judgement.evidence import Evidence, weigh
+from fitmat.judgement.left_out import LeftOut, leave_incidences_out
+from fitmat.judgement.plausibility import broken_laws, doubts
 from fitmat.measurements.samples import Measurements
 from fitmat.models.registry import LOBES
-from fitmat.plausibility import broken_laws, doubts
 from fitmat.text import html_table, text_table
 from fitmat.uncertainty.posterior import Posterior
 

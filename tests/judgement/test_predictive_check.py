@@ -9,8 +9,8 @@ from scipy import stats
 import fitmat as fm
 from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
+from fitmat.judgement.predictive_check import PredictiveCheck, check_predictions
 from fitmat.measurements.incidences import incidences
-from fitmat.predictive_check import PredictiveCheck, check_predictions
 from fitmat.uncertainty.posterior import Posterior
 
 REPEATS = 60

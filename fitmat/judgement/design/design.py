@@ -15,12 +15,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.candidates import Candidates, Kind, Limits, proposed
 from fitmat.errors import FitmatError
-from fitmat.filter_bank import Bank, Task, bank, scores
 from fitmat.fitting.result import Fit
+from fitmat.judgement.design.candidates import Candidates, Kind, Limits, proposed
+from fitmat.judgement.design.filters import Bank, Task, bank, scores
+from fitmat.judgement.identifiability.profiles import free_names
 from fitmat.measurements.noise import noise_law
-from fitmat.profile_likelihood import free_names
 from fitmat.uncertainty.posterior import Posterior
 
 APART = 4.9

@@ -23,6 +23,7 @@ from fitmat.fitting.likelihood import Data, log_likelihood, mapped
 from fitmat.fitting.priors import DISCREPANCY, draw, prepared
 from fitmat.fitting.result import free_places
 from fitmat.fitting.stabilising import from_stabilised, stabilised
+from fitmat.judgement.uniformity import p_values
 from fitmat.measurements.instrument import IDEAL
 from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF, evaluate, evaluate_pairs
@@ -31,7 +32,6 @@ from fitmat.models.registry import model
 from fitmat.uncertainty.chains import sample
 from fitmat.uncertainty.laplace import laplace
 from fitmat.uncertainty.posterior import Posterior
-from fitmat.uniformity import p_values
 
 DRAWS = 99
 """L, draws among which the truth is ranked: far fewer than a posterior's effective ones, so hardly dependent."""

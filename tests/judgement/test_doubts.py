@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fitmat as fm
-from fitmat.adequacy import doubted
+from fitmat.judgement.doubts import doubted
 
 ANGLES = np.deg2rad([10.0, 30.0, 50.0, 70.0]), np.deg2rad(np.arange(-80.0, 81.0, 2.0))
 CAUTION = "The intervals hold only if the model and the noise are right, which these data contradict."

@@ -8,7 +8,7 @@ from oracles import ggx
 
 import fitmat as fm
 from fitmat.fitting.result import Fit
-from fitmat.prediction import Section, curve, predictive_band, sections
+from fitmat.judgement.prediction import Section, curve, predictive_band, sections
 from fitmat.uncertainty.posterior import Posterior
 
 FRESH = 40

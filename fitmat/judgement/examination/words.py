@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fitmat.examination import phrases as say
-from fitmat.examination.consistency import Agreement, Consistency
-from fitmat.examination.coverage import NEAR, Coverage
-from fitmat.examination.phrases import LISTED, Said
-from fitmat.examination.value_range import ValueRange
+from fitmat.judgement.examination import phrases as say
+from fitmat.judgement.examination.consistency import Agreement, Consistency
+from fitmat.judgement.examination.coverage import NEAR, Coverage
+from fitmat.judgement.examination.phrases import LISTED, Said
+from fitmat.judgement.examination.value_range import ValueRange
 from fitmat.measurements.samples import Measurements
 
 GRAZING = np.deg2rad(60.0)

@@ -8,7 +8,7 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.examination.coverage import Incidence
+from fitmat.judgement.examination.coverage import Incidence
 from fitmat.measurements.samples import IN_PLANE, Measurements
 
 PROMINENT = 3.0

@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from fitmat.fitting.result import Fit
+from fitmat.judgement.prediction import sections
 from fitmat.maths.directions import from_angles
-from fitmat.prediction import sections
 
 Kind = Literal["sample", "curve"]
 """A single sample, or one incidence with a scan of theta_o."""

@@ -9,10 +9,10 @@ from arviz_stats.ecdf_utils import ecdf_pit
 from scipy import stats
 
 import fitmat as fm
-from fitmat import calibration
-from fitmat.calibration import DRAWS, Calibration, calibrate, coverage_limits, join, rejected
 from fitmat.errors import FitmatError, ModelError
-from fitmat.uniformity import SETS, band, p_values
+from fitmat.judgement import calibration
+from fitmat.judgement.calibration import DRAWS, Calibration, calibrate, coverage_limits, join, rejected
+from fitmat.judgement.uniformity import SETS, band, p_values
 
 PRIORS: dict[str, Any] = {"kd": (0.5, 0.1), "discrepancy": (0.0, 0.005)}
 SIMULATIONS = 60

@@ -12,8 +12,8 @@ from jaxtyping import Float
 
 from fitmat.fitting.priors import natural_sd
 from fitmat.fitting.result import Fit
+from fitmat.judgement.identifiability.profiles import free_names
 from fitmat.models.terms.fresnel import f0_from_eta, f0_from_ior
-from fitmat.profile_likelihood import free_names
 
 CONDITION = 30.0
 """Condition index from which columns of a Jacobian act alike: "moderate to strong" of Belsley, Kuh & Welsch (1980,

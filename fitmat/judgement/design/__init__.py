@@ -1,0 +1,4 @@
+"""Design: the next measurement that would tell most.
+
+It measures nothing and refits nothing.
+"""
