@@ -20,7 +20,7 @@ import numpy as np
 from tables import replace_between, to_markdown
 
 import fitmat as fm
-from fitmat.comparison import Comparison
+from fitmat.match.match import Comparison
 
 MODELS = ("lambert+blinn-phong", "lambert+ggx")
 

@@ -1,10 +1,7 @@
-from .comparison import Comparison as Comparison
-from .comparison import compare as compare
 from .errors import FitmatError as FitmatError
 from .examination.plots import plot_examination as plot_examination
 from .fitting.fitting import fit as fit
 from .fitting.result import Fit as Fit
-from .imitation import imitate as imitate
 from .judgement.calibration import Calibration as Calibration
 from .judgement.calibration import calibrate as calibrate
 from .judgement.choice import Choice as Choice
@@ -19,6 +16,9 @@ from .judgement.identifiability.verdicts import Identifiability as Identifiabili
 from .judgement.identifiability.verdicts import identify as identify
 from .judgement.prediction import sections as sections
 from .judgement.predictive_check import check_predictions as check_predictions
+from .match.imitation import imitate as imitate
+from .match.match import Comparison as Comparison
+from .match.match import compare as compare
 from .measurements.instrument import Instrument as Instrument
 from .measurements.reader import read as read
 from .measurements.samples import Measurements as Measurements

@@ -17,13 +17,13 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
 
-from fitmat.comparison import Comparison, compare, is_empirical, is_microfacet
 from fitmat.errors import ModelError
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.priors import DISCREPANCY
 from fitmat.fitting.result import Fit
 from fitmat.fitting.streamed import fit_chunks
 from fitmat.judgement.choice import every_model
+from fitmat.match.match import Comparison, compare, is_empirical, is_microfacet
 from fitmat.measurements.large import chunks
 from fitmat.measurements.large.stream import Rows, held
 from fitmat.measurements.reader import read

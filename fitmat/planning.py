@@ -12,10 +12,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fitmat.comparison import is_microfacet
 from fitmat.errors import OutputError
 from fitmat.files import write_bytes
 from fitmat.judgement.design.design import MATCH, Design, Proposal, next_angles
+from fitmat.match.match import is_microfacet
 from fitmat.models.parameters import space
 from fitmat.text import plain, text_table
 from fitmat.uncertainty.posterior import Posterior

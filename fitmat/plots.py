@@ -10,16 +10,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fitmat.ablation import Ablation
-from fitmat.comparison import Comparison
 from fitmat.fitting.result import Fit
 from fitmat.judgement.choice import SMALL, Choice
 from fitmat.judgement.design.design import Design
 from fitmat.judgement.prediction import Section, curve, predictive_band, standardised_residuals
+from fitmat.match.ablation import Ablation
+from fitmat.match.appearance.spheres import Perceived
+from fitmat.match.discernibility import SEPARATED, Telling
+from fitmat.match.match import Comparison
+from fitmat.match.regions import REGIONS
 from fitmat.maths.directions import signed_zenith
-from fitmat.regions import REGIONS
-from fitmat.sphere import Perceived
-from fitmat.telling import SEPARATED, Telling
 from fitmat.uncertainty.posterior import Posterior
 
 # Okabe & Ito's palette, safe for colour-blind readers.

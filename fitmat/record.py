@@ -6,13 +6,13 @@ It computes nothing; numbers that are not finite become null.
 from importlib.metadata import version
 from typing import Any
 
-from fitmat.comparison import Comparison
 from fitmat.fitting import priors
 from fitmat.fitting.result import RESULTS
 from fitmat.judgement.choice import Choice
 from fitmat.judgement.identifiability.verdicts import Identifiability
 from fitmat.judgement.metrics import fit_metrics
-from fitmat.sphere import Perceived, Spread
+from fitmat.match.appearance.spheres import Perceived, Spread
+from fitmat.match.match import Comparison
 from fitmat.study import Study
 from fitmat.text import plain
 from fitmat.uncertainty.estimate import Estimate

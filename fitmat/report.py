@@ -19,22 +19,22 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from fitmat import plots, record
-from fitmat.ablation import EXPLAINS, TERMS
-from fitmat.comparison import Comparison
-from fitmat.distances import METRICS
 from fitmat.fitting import priors
 from fitmat.fitting.result import RESULTS, Fit
-from fitmat.headline import CLOSE, SIMILAR
 from fitmat.judgement.choice import Choice
 from fitmat.judgement.metrics import fit_metrics
 from fitmat.judgement.prediction import sections
+from fitmat.match.ablation import EXPLAINS, TERMS
+from fitmat.match.appearance.colour import WHITE_LUMINANCE
+from fitmat.match.appearance.spheres import CLEARLY_VISIBLE, JUST_NOTICEABLE
+from fitmat.match.discernibility import SEPARATED
+from fitmat.match.distances import METRICS
+from fitmat.match.match import Comparison
+from fitmat.match.regions import GRAZING_DEG, REGIONS
+from fitmat.match.sentences import CLOSE, SIMILAR
 from fitmat.measurements.samples import Measurements
 from fitmat.models.parameters import space
-from fitmat.regions import GRAZING_DEG, REGIONS
-from fitmat.spectra import WHITE_LUMINANCE
-from fitmat.sphere import CLEARLY_VISIBLE, JUST_NOTICEABLE
 from fitmat.study import Study
-from fitmat.telling import SEPARATED
 from fitmat.text import interval, with_error
 from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS, Posterior
 from fitmat.uncertainty.quantities import derived, parameters

@@ -6,11 +6,11 @@ It fits and samples nothing: it gathers what other rooms say of posteriors.
 import dataclasses
 from collections.abc import Callable, Sequence
 
-from fitmat.comparison import Comparison
 from fitmat.judgement.choice import Choice, choose
 from fitmat.judgement.doubts import Doubts, doubted
 from fitmat.judgement.identifiability.verdicts import Identifiability, identify
 from fitmat.judgement.predictive_check import PredictiveCheck, check_predictions
+from fitmat.match.match import Comparison
 from fitmat.uncertainty.posterior import Posterior
 from fitmat.uncertainty.second_sampler import SecondOpinion, check_posterior
 

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 import fitmat
 from fitmat import console, plots
-from fitmat.comparison import Comparison, compare
 from fitmat.judgement import prediction
+from fitmat.match.match import Comparison, compare
 from fitmat.models.simulation import simulate
 from fitmat.uncertainty.posterior import Posterior
 

@@ -10,18 +10,20 @@ import pytest
 from oracles import ggx
 
 import fitmat as fm
-from fitmat import comparison, headline, plots, sphere
-from fitmat.ablation import EXPLAINS, TERMS, Ablation
-from fitmat.comparison import ALBEDO_ANGLES, Comparison, compare
-from fitmat.distances import METRICS
+from fitmat import plots
 from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
-from fitmat.imitation import Imitation
 from fitmat.judgement.metrics import fit_metrics
+from fitmat.match import match, sentences
+from fitmat.match.ablation import EXPLAINS, TERMS, Ablation
+from fitmat.match.appearance import spheres
+from fitmat.match.discernibility import SEPARATED, Telling
+from fitmat.match.distances import METRICS
+from fitmat.match.imitation import Imitation
+from fitmat.match.match import ALBEDO_ANGLES, Comparison, compare
+from fitmat.match.regions import GRAZING_DEG, REGIONS
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha, fitted_alpha, fitted_exponent
-from fitmat.regions import GRAZING_DEG, REGIONS
-from fitmat.telling import SEPARATED, Telling
 from fitmat.uncertainty.estimate import Estimate
 from fitmat.uncertainty.posterior import Posterior
 
@@ -212,7 +214,7 @@ def test_the_match_asks_what_an_eye_sees(fits: tuple[Fit, Fit], monkeypatch: pyt
         asked.append(given)
         return type("Seen", (), {"words": "An eye would wonder."})()
 
-    monkeypatch.setattr(sphere, "perceived", look)
+    monkeypatch.setattr(spheres, "perceived", look)
     found = compare(*(fm.laplace(fit, seed=1) for fit in fits))
     empirical, microfacet, draws, channels = asked[0]
     assert (empirical.name, microfacet.name, channels) == ("lambert+blinn-phong", "lambert+ggx", ("value",))
@@ -228,7 +230,7 @@ def imitated(what: AbstractBRDF, into: AbstractBRDF, metric: str) -> Imitation:
 
 def test_each_model_imitates_the_other(match: Comparison, monkeypatch: pytest.MonkeyPatch) -> None:
     """In four metrics, both ways, at the best fits."""
-    monkeypatch.setattr(comparison, "imitate", lambda fit, into, metric: imitated(fit.model, into, metric))
+    monkeypatch.setattr(match, "imitate", lambda fit, into, metric: imitated(fit.model, into, metric))
     found = dataclasses.replace(match).imitations
     one, other = "lambert+blinn-phong", "lambert+ggx"
     metrics = ("relative", "ngan", "cube-root", "log-ratio")
@@ -258,14 +260,14 @@ def telling(separation: list[float], rms: list[float], every: float) -> Telling:
     ],
 )
 def test_the_headline_says_what_the_instrument_can_tell(given: tuple[Any, ...], words: str) -> None:
-    sentence = headline.telling_sentence(("blinn", "ggx"), telling(*given))
+    sentence = sentences.telling_sentence(("blinn", "ggx"), telling(*given))
     assert sentence is not None
     assert words in sentence
 
 
 def test_the_headline_keeps_quiet_where_the_noise_is_unknown() -> None:
     unknown = dataclasses.replace(telling([6.0] * 3, [2.0] * 3, 9.9), known=False)
-    assert headline.telling_sentence(("blinn", "ggx"), unknown) is None
+    assert sentences.telling_sentence(("blinn", "ggx"), unknown) is None
 
 
 def test_the_headline_says_what_is_missing_at_grazing_incidence_and_why(match: Comparison) -> None:
@@ -277,12 +279,12 @@ def test_the_headline_says_what_is_missing_at_grazing_incidence_and_why(match: C
         "all": Estimate(1.0, (1.0, 1.0)),
     }
     known = dataclasses.replace(ablation, grazing=certain)
-    sentence = headline.grazing_sentence(("blinn", "ggx"), Estimate(-0.38, (-0.42, -0.34)), known)
+    sentence = sentences.grazing_sentence(("blinn", "ggx"), Estimate(-0.38, (-0.42, -0.34)), known)
     assert sentence == "Beyond 70° blinn reflects 38 % less than ggx (34–42 %): it has no Fresnel term."
-    without = headline.grazing_sentence(("blinn", "ggx"), Estimate(0.12, (0.1, 0.14)), None)
+    without = sentences.grazing_sentence(("blinn", "ggx"), Estimate(0.12, (0.1, 0.14)), None)
     assert without == "Beyond 70° blinn reflects 12 % more than ggx (10–14 %)."
     for little in (Estimate(-0.04, (-0.05, -0.03)), Estimate(-0.38, (-0.8, 0.04))):
-        assert headline.grazing_sentence(("blinn", "ggx"), little, known) is None
+        assert sentences.grazing_sentence(("blinn", "ggx"), little, known) is None
 
 
 def test_the_pictures_show_the_numbers(match: Comparison) -> None:
@@ -307,21 +309,21 @@ def test_the_pictures_show_the_numbers(match: Comparison) -> None:
 @pytest.mark.parametrize("known", [True, False])
 def test_the_page_tells_the_match_in_words(match: Comparison, known: bool) -> None:
     """Every variable is there, and the sentences say what the numbers do."""
-    folder = jinja2.FileSystemLoader(Path(headline.__file__).with_name("templates"))
+    folder = jinja2.FileSystemLoader(Path(sentences.__file__).with_name("templates"))
     environment = jinja2.Environment(loader=folder, autoescape=True, undefined=jinja2.StrictUndefined)
     environment.filters["png"] = str
     telling = dataclasses.replace(match.telling, known=known)
     one = dataclasses.replace(match, telling=telling, ablation=match.ablation if known else None)
     fits = match.empirical.fit, match.microfacet.fit
-    both = [imitated(fits[1 - k].model, fits[k].model, metric) for k in (0, 1) for metric in comparison.IMITATED]
+    both = [imitated(fits[1 - k].model, fits[k].model, metric) for k in (0, 1) for metric in match.IMITATED]
     one.__dict__["imitations"] = tuple(both)  # what is cached is not asked for
     page = environment.get_template("match.html").render(
         match=one,
         regions=REGIONS,
         metrics_of_match=METRICS,
         terms=TERMS,
-        close=headline.CLOSE,
-        similar=headline.SIMILAR,
+        close=sentences.CLOSE,
+        similar=sentences.SIMILAR,
         separated=SEPARATED,
         explains=EXPLAINS,
         grazing_deg=GRAZING_DEG,

@@ -14,12 +14,13 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, ArrayLike, Float
 
-from fitmat.distances import AZIMUTHS, METRICS, direction_weight, incidence_weight
 from fitmat.errors import FitmatError
 from fitmat.fitting.fitting import STEADY, Chart
 from fitmat.fitting.likelihood import mapped
 from fitmat.fitting.result import Fit, free_places
 from fitmat.fitting.starts import nonnegative
+from fitmat.match.distances import AZIMUTHS, METRICS, direction_weight, incidence_weight
+from fitmat.match.regions import incidence_panels
 from fitmat.maths.least_squares import least_squares
 from fitmat.maths.quadrature import Rule, lobe_rule
 from fitmat.models.around.instrument import surface
@@ -27,7 +28,6 @@ from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.conversion import exponent_from_alpha
 from fitmat.models.parameters import check_range, entries, space, vector, with_vector
 from fitmat.models.registry import model
-from fitmat.regions import incidence_panels
 
 LEAST_SQUARES = tuple(name for name, metric in METRICS.items() if metric.kind != "light")
 """Metrics that are sums of squares, and can be minimised as such."""

@@ -16,14 +16,14 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.ndimage import map_coordinates
 
-from fitmat import scene
 from fitmat.fitting.likelihood import mapped
+from fitmat.match.appearance import scene
+from fitmat.match.appearance.colour import colouring, delta_e_2000, delta_e_itp, shown, to_srgb
+from fitmat.match.appearance.scene import Screen
 from fitmat.maths.directions import zenith
 from fitmat.models.around.instrument import surface
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.parameters import with_vector
-from fitmat.scene import Screen
-from fitmat.spectra import colouring, delta_e_2000, delta_e_itp, shown, to_srgb
 from fitmat.uncertainty.estimate import Estimate, estimate
 
 DRAWS = 40
@@ -67,7 +67,7 @@ class Lighting:
         name: Of the light.
         exposure: Factor from radiance (irradiance 1 on a surface that faces the light; sky zenith 1) to display.
         delta_e_2000: CIEDE2000 of what an sRGB display shows, which clips what is brighter than white.
-        delta_e_itp: ΔE_ITP with white at `spectra.WHITE_LUMINANCE`, highlights up to 10,000 cd/m².
+        delta_e_itp: ΔE_ITP with white at `colour.WHITE_LUMINANCE`, highlights up to 10,000 cd/m².
         empirical: Picture of the best fit in sRGB from 0 to 1, (h, w, 3), rows from the top; NaN beside the sphere.
         microfacet: The same of the microfacet model.
         difference: ΔE2000 of the pictures, (h, w); NaN beside the sphere.

@@ -14,11 +14,11 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat._types import Scalar
+from fitmat.match.regions import GRAZING_DEG, NGAN_DEG, REGIONS, incidence_panels, memberships
 from fitmat.maths.quadrature import Rule, lobe_rule
 from fitmat.models.around.instrument import surface
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import with_vector
-from fitmat.regions import GRAZING_DEG, NGAN_DEG, REGIONS, incidence_panels, memberships
 from fitmat.uncertainty.estimate import Estimate, band, estimate
 
 AZIMUTHS = 4

@@ -11,10 +11,11 @@ import pytest
 from oracles import ggx
 
 import fitmat as fm
-from fitmat import plots, scene
+from fitmat import plots
+from fitmat.match.appearance import scene
+from fitmat.match.appearance.spheres import Perceived, Spread, _spread, perceived
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.parameters import vector
-from fitmat.sphere import Perceived, Spread, _spread, perceived
 from fitmat.uncertainty.estimate import Estimate
 
 EVEN = 3e-3

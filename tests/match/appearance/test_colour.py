@@ -6,8 +6,8 @@ import sys
 import numpy as np
 import pytest
 
-from fitmat import spectra
-from fitmat.spectra import colouring, delta_e_2000, delta_e_itp
+from fitmat.match.appearance import colour
+from fitmat.match.appearance.colour import colouring, delta_e_2000, delta_e_itp
 
 PRINTED = 5e-5
 """ΔE2000; Sharma's table has four digits after the point."""
@@ -85,15 +85,13 @@ def test_red_green_and_blue_have_the_primaries_of_srgb() -> None:
     expected = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]]
     np.testing.assert_allclose((weights / weights.sum(axis=1, keepdims=True))[:, :2], expected, atol=ROUNDED)
     np.testing.assert_allclose(weights.sum(axis=0), WHITE, atol=ROUNDED)
-    np.testing.assert_allclose(
-        spectra.to_srgb(0.18 * weights.sum(axis=0)), 1.055 * 0.18 ** (1 / 2.4) - 0.055, atol=1e-4
-    )
+    np.testing.assert_allclose(colour.to_srgb(0.18 * weights.sum(axis=0)), 1.055 * 0.18 ** (1 / 2.4) - 0.055, atol=1e-4)
 
 
 def test_a_display_shows_nothing_brighter_than_white() -> None:
     weights = colouring(("r", "g", "b")).weights
-    np.testing.assert_allclose(spectra.shown(5.0 * weights.sum(axis=0)), weights.sum(axis=0), atol=1e-9)
-    np.testing.assert_allclose(spectra.shown(np.array([2.0, 0.5, -0.1]) @ weights), np.array([1, 0.5, 0]) @ weights)
+    np.testing.assert_allclose(colour.shown(5.0 * weights.sum(axis=0)), weights.sum(axis=0), atol=1e-9)
+    np.testing.assert_allclose(colour.shown(np.array([2.0, 0.5, -0.1]) @ weights), np.array([1, 0.5, 0]) @ weights)
 
 
 def test_a_flat_spectrum_is_white_and_a_line_has_its_own_colour() -> None:
@@ -134,7 +132,7 @@ import sys, warnings
 from fitmat import spectra
 assert "colour" not in sys.modules
 before = list(warnings.filters)
-spectra.colouring(("r", "g", "b"))
+colour.colouring(("r", "g", "b"))
 assert "colour" in sys.modules and warnings.filters == before
 """
     done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False)

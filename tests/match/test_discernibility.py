@@ -7,8 +7,8 @@ import pytest
 
 import fitmat as fm
 from fitmat.fitting.result import Fit
+from fitmat.match.discernibility import ROWS, SEPARATED, Telling, tell_apart
 from fitmat.models.parameters import vector
-from fitmat.telling import ROWS, SEPARATED, Telling, tell_apart
 
 CHANCE = 0.005
 """Four standard errors of a rate of 2.5 % in 20,000 simulated measurements."""

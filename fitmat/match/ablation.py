@@ -15,7 +15,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat._types import Scalar, Spectrum, Vec3
-from fitmat.distances import ANGLES, AZIMUTHS, Values
+from fitmat.match.distances import ANGLES, AZIMUTHS, Values
+from fitmat.match.regions import GRAZING_DEG
 from fitmat.maths.quadrature import lobe_rule
 from fitmat.models.around.instrument import surface
 from fitmat.models.base import AbstractBRDF, Sum
@@ -26,7 +27,6 @@ from fitmat.models.lobes.walter import Walter
 from fitmat.models.parameters import with_vector
 from fitmat.models.terms.distributions import AbstractDistribution, Beckmann, Slopes
 from fitmat.models.terms.fresnel import AbstractFresnel
-from fitmat.regions import GRAZING_DEG
 from fitmat.uncertainty.estimate import Estimate, band, estimate
 
 TERMS = {

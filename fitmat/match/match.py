@@ -12,24 +12,24 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from fitmat import headline
-from fitmat.ablation import Ablation, ablate
-from fitmat.distances import ANGLES, Distances, Values, measure_distances
 from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
-from fitmat.headline import CLOSE as CLOSE
-from fitmat.headline import SIMILAR as SIMILAR
-from fitmat.headline import STRONG_EVIDENCE as STRONG_EVIDENCE
-from fitmat.imitation import Imitation, imitate
+from fitmat.match import sentences
+from fitmat.match.ablation import Ablation, ablate
+from fitmat.match.discernibility import Telling, tell_apart
+from fitmat.match.distances import ANGLES, Distances, Values, measure_distances
+from fitmat.match.imitation import Imitation, imitate
+from fitmat.match.sentences import CLOSE as CLOSE
+from fitmat.match.sentences import SIMILAR as SIMILAR
+from fitmat.match.sentences import STRONG_EVIDENCE as STRONG_EVIDENCE
 from fitmat.measurements.samples import Measurements
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
 from fitmat.models.registry import LOBES, lobe_names
-from fitmat.telling import Telling, tell_apart
 from fitmat.uncertainty.estimate import Estimate, band, estimate
 from fitmat.uncertainty.posterior import Posterior
 
 if TYPE_CHECKING:
-    from fitmat.sphere import Perceived
+    from fitmat.match.appearance.spheres import Perceived
 
 DRAWS = 100
 """Posterior draws behind every interval of the match."""
@@ -104,12 +104,12 @@ class Comparison:
         """The match in plain sentences; the thresholds are those of `headline`, `telling`, `ablation` and `sphere`."""
         names = _lobe_title(self.empirical.fit.name), _lobe_title(self.microfacet.fit.name)
         found = [
-            headline.distance_sentence(names, self.hemisphere_distance),
-            headline.telling_sentence(names, self.telling),
-            headline.grazing_sentence(names, self.distances.grazing_excess, self.ablation),
-            headline.gap_sentence(names, self.albedo_gap_max, self.albedo_gap_sign, self.albedo_gap_theta_i_deg),
+            sentences.distance_sentence(names, self.hemisphere_distance),
+            sentences.telling_sentence(names, self.telling),
+            sentences.grazing_sentence(names, self.distances.grazing_excess, self.ablation),
+            sentences.gap_sentence(names, self.albedo_gap_max, self.albedo_gap_sign, self.albedo_gap_theta_i_deg),
             None if self.perceived is None else self.perceived.words,
-            headline.evidence_sentence(names, self.delta_bic),
+            sentences.evidence_sentence(names, self.delta_bic),
             f"{names[0]} {self.empirical.fit.adequacy}; {names[1]} {self.microfacet.fit.adequacy}.",
         ]
         return " ".join([sentence for sentence in found if sentence] + self._cautions(names))
@@ -232,7 +232,7 @@ def _concluded(pair: tuple[Posterior, Posterior], found: Distances, **parts: Any
 
 
 def _perceived(empirical: Fit, microfacet: Fit, values: Values) -> "Perceived":
-    from fitmat.sphere import perceived  # loads colour-science
+    from fitmat.match.appearance.spheres import perceived  # loads colour-science
 
     vectors = jnp.asarray(values[0]), jnp.asarray(values[1])
     return perceived(empirical.model, microfacet.model, vectors, empirical.measurements.channels)

@@ -5,9 +5,9 @@ It measures nothing and decides nothing that a named threshold does not.
 
 import math
 
-from fitmat.ablation import TERMS, Ablation
-from fitmat.regions import GRAZING_DEG
-from fitmat.telling import SEPARATED, Telling
+from fitmat.match.ablation import TERMS, Ablation
+from fitmat.match.discernibility import SEPARATED, Telling
+from fitmat.match.regions import GRAZING_DEG
 from fitmat.uncertainty.estimate import Estimate
 
 CLOSE, SIMILAR = 0.1, 0.3

@@ -8,15 +8,15 @@ from oracles import ggx
 from scipy.integrate import dblquad, quad
 
 import fitmat as fm
-from fitmat.ablation import TERMS, Ablation, CosinePower, ablate, ablated
-from fitmat.distances import ANGLES, METRICS, Distances, measure_distances
+from fitmat.match.ablation import TERMS, Ablation, CosinePower, ablate, ablated
+from fitmat.match.distances import ANGLES, METRICS, Distances, measure_distances
+from fitmat.match.regions import REGIONS
 from fitmat.models.base import AbstractBRDF, Sum
 from fitmat.models.lobes.lambert import Lambert
 from fitmat.models.lobes.microfacet import Microfacet
 from fitmat.models.parameters import vector
 from fitmat.models.terms.distributions import GGX, Isotropic
 from fitmat.models.terms.fresnel import White
-from fitmat.regions import REGIONS
 from fitmat.uncertainty.estimate import Estimate
 
 EXACT = 1e-9

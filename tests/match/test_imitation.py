@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 
 import fitmat as fm
 from fitmat.errors import FitmatError
-from fitmat.imitation import LEAST_SQUARES, imitate
+from fitmat.match.imitation import LEAST_SQUARES, imitate
 from fitmat.models.conversion import (
     ALPHA_CORRECTION,
     EXPONENT_CORRECTION,

@@ -12,8 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.distances import Values
 from fitmat.fitting.result import Fit
+from fitmat.match.distances import Values
 from fitmat.models.base import AbstractBRDF, evaluate_pairs, padded_length
 from fitmat.models.parameters import with_vector
 from fitmat.uncertainty.estimate import Estimate, band, estimate

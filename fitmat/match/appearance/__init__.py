@@ -1,0 +1,4 @@
+"""Appearance: lit spheres of two models, and how different their colours look.
+
+It knows no measurement.
+"""
