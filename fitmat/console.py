@@ -30,7 +30,7 @@ from fitmat.measurements.reader import read
 from fitmat.measurements.samples import Measurements
 from fitmat.models.parameters import entries
 from fitmat.models.registry import LOBES, lobe_names, model, normalised
-from fitmat.study import Study, concluded
+from fitmat.studies.study import Study, concluded
 from fitmat.uncertainty.chains import resumable_steps, sample
 from fitmat.uncertainty.laplace import laplace, laplace_each
 from fitmat.uncertainty.posterior import Posterior

@@ -18,7 +18,7 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from fitmat import plots, record
+from fitmat import plots
 from fitmat.fitting import priors
 from fitmat.fitting.result import RESULTS, Fit
 from fitmat.judgement.choice import Choice
@@ -34,7 +34,8 @@ from fitmat.match.regions import GRAZING_DEG, REGIONS
 from fitmat.match.sentences import CLOSE, SIMILAR
 from fitmat.measurements.samples import Measurements
 from fitmat.models.parameters import space
-from fitmat.study import Study
+from fitmat.studies import record
+from fitmat.studies.study import Study
 from fitmat.text import interval, with_error
 from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS, Posterior
 from fitmat.uncertainty.quantities import derived, parameters

@@ -10,7 +10,7 @@ import fitmat
 from fitmat import console, screen
 from fitmat.errors import ModelError
 from fitmat.models.simulation import simulate
-from fitmat.study import Study
+from fitmat.studies.study import Study
 from fitmat.uncertainty.posterior import Posterior
 
 

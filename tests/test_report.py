@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 
 import fitmat
-from fitmat import console, record, report
+from fitmat import console, report
 from fitmat.measurements.samples import Measurements
 from fitmat.models.simulation import simulate
-from fitmat.study import Study
+from fitmat.studies import record
+from fitmat.studies.study import Study
 from fitmat.text import interval, with_error
 
 NAMES = ["lambert+blinn-phong", "lambert+ggx"]

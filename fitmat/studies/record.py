@@ -13,7 +13,7 @@ from fitmat.judgement.identifiability.verdicts import Identifiability
 from fitmat.judgement.metrics import fit_metrics
 from fitmat.match.appearance.spheres import Perceived, Spread
 from fitmat.match.match import Comparison
-from fitmat.study import Study
+from fitmat.studies.study import Study
 from fitmat.text import plain
 from fitmat.uncertainty.estimate import Estimate
 from fitmat.uncertainty.posterior import Posterior
