@@ -9,10 +9,10 @@ import os
 from pathlib import Path
 
 from fitmat.errors import OutputError
-from fitmat.examination.plots import plot_examination
 from fitmat.files import write_bytes
 from fitmat.judgement.examination.examining import Examination, examine
 from fitmat.measurements.samples import Measurements
+from fitmat.reports.examination_plots import plot_examination
 
 PICTURES = ("png", "svg", "pdf")
 DPI = 150

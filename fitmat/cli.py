@@ -47,7 +47,7 @@ def _setup() -> None:
     epilog="Columns of a table, by name: theta_i, theta_o and phi (or phi_i and phi_o, or a signed theta_o alone) in "
     "degrees; brdf, brdf_cos, reflectance_factor, radiance, or signal and reference; brdf_r, brdf_g, brdf_b or "
     "brdf_550 for channels; sigma where the noise is known.\n\n"
-    "Written to --out: report.html (tables and pictures), fit.json (the same numbers), posterior-MODEL.nc (draws of "
+    "Written to --out: page.html (tables and pictures), fit.json (the same numbers), posterior-MODEL.nc (draws of "
     "the parameters, for ArviZ). Ctrl-C during sampling keeps what is done and still writes them; a killed run goes on "
     "when it is given again.\n\n"
     "Examples:\n\n"
@@ -78,29 +78,30 @@ def fit(
 ) -> None:
     """Fit models to a file of measurements and write a report with the Phong–microfacet match."""
     _setup()
-    from fitmat import console, files, report, screen
+    from fitmat import console, files
     from fitmat.fitting import known, priors
     from fitmat.measurements.samples import Measurements
     from fitmat.models.parameters import assignments
+    from fitmat.reports import page, terminal
 
     fixed, believed = assignments(fix or [], "--fix"), priors.assignments(prior or [])
     measurements = console.source(file, reading | {"instrument": instrument})
     shown = measurements if isinstance(measurements, Measurements) else measurements.part
     known = known.prepared(console.model_names(models, shown), shown, ior=ior, tilt=tilt)
     target = out or files.default(file)
-    with files.new(target, force=force, stale=report.POSTERIOR.format("*")) as draft:
+    with files.new(target, force=force, stale=page.POSTERIOR.format("*")) as draft:
         process.leave_on_interrupt(draft)
         plan = console.Plan(
             known, fixed, believed, loss, masking, not no_mcmc, seed, check_posterior, files.resumed(target)
         )
         found = console.study(measurements, plan)
-        report.write(draft, found)
+        page.write(draft, found)
     if not no_mcmc:
         files.discard(files.resumed(target))
     if json_:
         sys.stdout.write((target / "fit.json").read_text(encoding="utf-8"))
     else:
-        screen.show(found, target)
+        terminal.show(found, target)
     if any(p.fit.result != "converged" or p.interrupted for p in found.posteriors):
         raise typer.Exit(NOT_CONVERGED)
 

@@ -61,7 +61,7 @@ def planned(
     if plot is not None:
         from matplotlib.figure import Figure
 
-        from fitmat.plots import plot_design
+        from fitmat.reports.plot import plot_design
 
         buffer = io.BytesIO()
         figure = Figure(figsize=(5.6, 4.4), layout="constrained")

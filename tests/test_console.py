@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 import fitmat
-from fitmat import console, screen
+from fitmat import console
 from fitmat.errors import ModelError
 from fitmat.models.simulation import simulate
+from fitmat.reports import terminal
 from fitmat.studies.study import Study
 from fitmat.uncertainty.posterior import Posterior
 
@@ -37,7 +38,7 @@ def test_no_model_name():
 
 
 def test_show_fits_80_columns(posterior, capsys, tmp_path):
-    screen.show(Study((posterior,)), tmp_path)
+    terminal.show(Study((posterior,)), tmp_path)
     out = capsys.readouterr().out
     lines = out.splitlines()
     assert max(map(len, (line for line in lines if str(tmp_path) not in line))) <= 80
@@ -50,7 +51,7 @@ def test_show_fits_80_columns(posterior, capsys, tmp_path):
 
 def test_show_names_the_outcome(posterior, capsys, tmp_path):
     fit = dataclasses.replace(posterior.fit, result="unidentifiable", undetermined=("eta",))
-    screen.show(Study((dataclasses.replace(posterior, fit=fit, interrupted=True),)), tmp_path)
+    terminal.show(Study((dataclasses.replace(posterior, fit=fit, interrupted=True),)), tmp_path)
     out = capsys.readouterr().out
     assert "unidentifiable: At least one parameter is not determined" in out
     assert "interrupted: sampling was stopped" in out
@@ -60,7 +61,7 @@ def test_show_names_the_outcome(posterior, capsys, tmp_path):
 def test_brackets_in_names_are_text(posterior, capsys, tmp_path):
     measurements = dataclasses.replace(posterior.fit.measurements, source="[red]x.csv", channels=("[bold]", "g", "b"))
     fit = dataclasses.replace(posterior.fit, measurements=measurements)
-    screen.show(Study((dataclasses.replace(posterior, fit=fit),)), tmp_path / "[dim]")
+    terminal.show(Study((dataclasses.replace(posterior, fit=fit),)), tmp_path / "[dim]")
     out = capsys.readouterr().out
     assert all(text in out for text in ("[red]x.csv", "kd [bold]", "[dim]/report.html"))
 

@@ -10,7 +10,6 @@ import pytest
 from oracles import ggx
 
 import fitmat as fm
-from fitmat import plots
 from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
 from fitmat.judgement.metrics import fit_metrics
@@ -24,6 +23,7 @@ from fitmat.match.match import ALBEDO_ANGLES, Comparison, compare
 from fitmat.match.regions import GRAZING_DEG, REGIONS
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha, fitted_alpha, fitted_exponent
+from fitmat.reports import plot
 from fitmat.uncertainty.estimate import Estimate
 from fitmat.uncertainty.posterior import Posterior
 
@@ -293,14 +293,14 @@ def test_the_pictures_show_the_numbers(match: Comparison) -> None:
     assert ablation is not None
     angle = np.rad2deg(match.distances.theta_i)
     shown = {
-        plots.plot_distances(match, "albedo"): {"all directions": match.distances.by_incidence["albedo"][1]},
-        plots.plot_ablation(ablation): {term: 100 * ablation.fall[term][1] for term in ("fresnel", "masking", "tail")},
+        plot.plot_distances(match, "albedo"): {"all directions": match.distances.by_incidence["albedo"][1]},
+        plot.plot_ablation(ablation): {term: 100 * ablation.fall[term][1] for term in ("fresnel", "masking", "tail")},
     }
     for ax, expected in shown.items():
         drawn = {line.get_label(): np.asarray(line.get_xydata()) for line in ax.lines}
         for label, values in expected.items():
             np.testing.assert_allclose(drawn[label], np.stack([angle, values], axis=1))
-    ax = plots.plot_telling(match.telling)
+    ax = plot.plot_telling(match.telling)
     points = {box.get_label(): box[0].get_xydata() for box in ax.containers}
     np.testing.assert_allclose(points["all readings"][:, 1], match.telling.separation[1])
     np.testing.assert_allclose(points["a single reading"][:, 1], match.telling.rms[1])

@@ -11,11 +11,11 @@ import pytest
 from oracles import ggx
 
 import fitmat as fm
-from fitmat import plots
 from fitmat.match.appearance import scene
 from fitmat.match.appearance.spheres import Perceived, Spread, _spread, perceived
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.parameters import vector
+from fitmat.reports import plot
 from fitmat.uncertainty.estimate import Estimate
 
 EVEN = 3e-3
@@ -299,7 +299,7 @@ def test_the_sentence_follows_the_upper_end_of_the_interval(greys: Perceived, li
 
 
 def test_spheres_are_drawn_by_light_and_model(greys: Perceived) -> None:
-    figure = plots.plot_spheres(greys)
+    figure = plot.plot_spheres(greys)
     pictures = [ax for ax in figure.axes if ax.images]
     assert len(pictures) == 12
     assert [ax.get_title() for ax in pictures[:4]] == [*scene.LIGHTS, scene.ENVIRONMENT]

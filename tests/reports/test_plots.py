@@ -10,10 +10,11 @@ from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
 import fitmat
-from fitmat import console, plots
+from fitmat import console
 from fitmat.judgement import prediction
 from fitmat.match.match import Comparison, compare
 from fitmat.models.simulation import simulate
+from fitmat.reports import plot
 from fitmat.uncertainty.posterior import Posterior
 
 NAMES = ["lambert+blinn-phong", "lambert+ggx"]
@@ -45,8 +46,8 @@ def labelled(ax: Axes) -> dict[str, np.ndarray]:
 def test_section_shows_every_valid_point_and_every_fit(studied, channel, count):
     posteriors, _ = studied
     section = prediction.sections(posteriors[0].fit.measurements)[0]
-    own = plots.new_axes()
-    ax = plots.plot_section(posteriors, section, channel=channel, ax=own)
+    own = plot.new_axes()
+    ax = plot.plot_section(posteriors, section, channel=channel, ax=own)
     assert ax is own
     lines = labelled(ax)
     assert list(lines) == [*NAMES, "measured"]
@@ -68,7 +69,7 @@ def test_section_follows_the_mirror_direction(studied):
     """The dotted line stands at theta_o = theta_i, and the fit is brighter on that side."""
     posteriors, _ = studied
     section = prediction.sections(posteriors[0].fit.measurements)[1]
-    ax = plots.plot_section(posteriors, section)
+    ax = plot.plot_section(posteriors, section)
     (mirror,) = (line for line in ax.lines if line.get_linestyle() == ":")
     assert np.asarray(mirror.get_xdata()) == pytest.approx(45.0)
     curve = labelled(ax)["lambert+ggx"]
@@ -86,15 +87,15 @@ def test_decades_are_drawn_on_a_logarithmic_axis(studied):
     steep = dataclasses.replace(
         posterior, fit=dataclasses.replace(posterior.fit, measurements=dataclasses.replace(m, value=value))
     )
-    assert plots.plot_section([posterior], section).get_yscale() == "linear"
-    ax = plots.plot_section([steep], section)
+    assert plot.plot_section([posterior], section).get_yscale() == "linear"
+    ax = plot.plot_section([steep], section)
     assert ax.get_yscale() == "log"
     assert ax.get_ylim()[1] > value.max()
 
 
 @pytest.mark.parametrize(("channel", "count"), [(0, 51), (1, 50)])
 def test_residuals_show_every_valid_sample(studied, channel, count):
-    ax = plots.plot_residuals(studied[0][1].fit, channel=channel)
+    ax = plot.plot_residuals(studied[0][1].fit, channel=channel)
     points = next(c for c in ax.collections if isinstance(c, PathCollection))
     z = np.asarray(points.get_offsets())[:, 1]
     assert len(z) == count
@@ -108,8 +109,8 @@ def test_residuals_show_every_valid_sample(studied, channel, count):
 
 def test_albedo_shows_both_models(studied):
     _, match = studied
-    own = plots.new_axes()
-    ax = plots.plot_albedo(match, own)
+    own = plot.new_axes()
+    ax = plot.plot_albedo(match, own)
     assert ax is own
     lines = labelled(ax)
     assert list(lines) == NAMES
@@ -126,26 +127,26 @@ def test_impossible_albedos_stay_inside_the_picture(studied, which):
     match = dataclasses.replace(
         studied[1], **{which: 3 * studied[1].albedo_microfacet / studied[1].albedo_microfacet.max()}
     )
-    assert plots.plot_albedo(match).get_ylim()[1] > 3.0
+    assert plot.plot_albedo(match).get_ylim()[1] > 3.0
 
 
 def test_corner_shows_free_parameters_only(studied):
     posterior = studied[0][1]
-    figure = plots.plot_corner(posterior)
+    figure = plot.plot_corner(posterior)
     assert isinstance(figure, Figure)
     assert len(figure.axes) == 8**2
     labels = [ax.get_xlabel() for ax in figure.axes[-8:]]
     assert labels == ["$k_d$ r", "$k_d$ g", "$k_d$ b", "$k_s$ r", "$k_s$ g", "$k_s$ b", "α", "η"]
     held = {name: np.array([1.0]) for name in ("kd", "ks")}
     fixed = dataclasses.replace(posterior, fit=dataclasses.replace(posterior.fit, held=held))
-    assert [ax.get_xlabel() for ax in plots.plot_corner(fixed).axes[-2:]] == ["α", "η"]
+    assert [ax.get_xlabel() for ax in plot.plot_corner(fixed).axes[-2:]] == ["α", "η"]
 
 
 def test_corner_of_one_parameter_marks_the_best_fit(studied):
     posterior = studied[0][1]
     held = {name: np.array([1.0]) for name in ("kd", "ks", "eta")}
     fit = dataclasses.replace(posterior.fit, held=held)
-    (ax,) = plots.plot_corner(dataclasses.replace(posterior, fit=fit)).axes
+    (ax,) = plot.plot_corner(dataclasses.replace(posterior, fit=fit)).axes
     assert ax.get_xlabel() == "α"
     alpha = float(fit.values[6])
     assert any(math.isclose(float(np.asarray(line.get_xdata())[0]), alpha) for line in ax.lines)
@@ -155,4 +156,4 @@ def test_corner_of_constant_draws(studied):
     """A chain that never moved is drawn, not refused."""
     posterior = studied[0][1]
     still = dataclasses.replace(posterior, values=np.repeat(posterior.values[:1], 100, axis=0))
-    assert len(plots.plot_corner(still).axes) == 8**2
+    assert len(plot.plot_corner(still).axes) == 8**2

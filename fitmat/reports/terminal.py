@@ -11,7 +11,7 @@ from rich.text import Text
 
 from fitmat.console import MOST_SAMPLED
 from fitmat.fitting.result import RESULTS
-from fitmat.report import rows
+from fitmat.reports.page import rows
 from fitmat.studies.study import Study, detailed
 from fitmat.uncertainty.posterior import Posterior
 

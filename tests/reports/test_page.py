@@ -14,9 +14,10 @@ import numpy as np
 import pytest
 
 import fitmat
-from fitmat import console, report
+from fitmat import console
 from fitmat.measurements.samples import Measurements
 from fitmat.models.simulation import simulate
+from fitmat.reports import page
 from fitmat.studies import record
 from fitmat.studies.study import Study
 from fitmat.text import interval, with_error
@@ -39,7 +40,7 @@ def studied() -> Study:
 
 @pytest.fixture(scope="module")
 def page(studied: Study) -> str:
-    return report.to_html(studied)
+    return page.to_html(studied)
 
 
 class Page(html.parser.HTMLParser):
@@ -119,7 +120,7 @@ def test_names_are_escaped(studied):
         posterior.fit.measurements, source=evil, channels=(evil, "g", "b"), notes=(evil,), masked={evil: 1}
     )
     fit = dataclasses.replace(posterior.fit, measurements=measurements)
-    found = Page(report.to_html(Study((dataclasses.replace(posterior, fit=fit),))))
+    found = Page(page.to_html(Study((dataclasses.replace(posterior, fit=fit),))))
     assert "script" not in found.tags
     assert found.text.count(evil) >= 4
 
@@ -127,7 +128,7 @@ def test_names_are_escaped(studied):
 def test_outcomes_are_labelled(studied):
     posterior = studied.posteriors[1]
     odd = dataclasses.replace(posterior.fit, result="unidentifiable", undetermined=("eta", "ks"))
-    text = Page(report.to_html(Study((dataclasses.replace(posterior, fit=odd, interrupted=True),)))).text
+    text = Page(page.to_html(Study((dataclasses.replace(posterior, fit=odd, interrupted=True),)))).text
     assert "lambert+ggx: unidentifiable. At least one parameter is not determined by these angles: fix it" in text
     assert "Not determined: ks, eta." in text or "Not determined: eta, ks." in text
     assert "sampling was interrupted; what was done is kept" in text
@@ -177,7 +178,7 @@ def test_json_has_null_for_what_is_not_finite(studied):
 def test_write_makes_every_file(studied, tmp_path):
     import xarray
 
-    report.write(tmp_path, studied)
+    page.write(tmp_path, studied)
     names = ["fit.json", *(f"posterior-{name}.nc" for name in NAMES), "report.html"]
     assert sorted(path.name for path in tmp_path.iterdir()) == names
     draws = xarray.open_dataset(tmp_path / names[2], group="posterior", engine="h5netcdf")
@@ -219,7 +220,7 @@ def test_intervals_have_the_digits_of_their_value(low, high, sd, text):
 def test_what_is_not_determined_shows_no_error(studied):
     posterior = studied.posteriors[1]
     fit = dataclasses.replace(posterior.fit, result="unidentifiable", undetermined=("eta",))
-    found = {row["name"]: row for row in report.rows(dataclasses.replace(posterior, fit=fit))}
+    found = {row["name"]: row for row in page.rows(dataclasses.replace(posterior, fit=fit))}
     for name in ("eta", "f0"):
         assert found[name]["remark"] == "not determined by these angles"
         assert "±" not in found[name]["value"]
@@ -229,6 +230,6 @@ def test_what_is_not_determined_shows_no_error(studied):
 
 def test_template_has_no_arithmetic():
     """A report formats; what it shows is computed elsewhere."""
-    text = (Path(report.__file__).parent / "templates" / "report.html").read_text()
+    text = (Path(page.__file__).parents[1] / "templates" / "report.html").read_text()
     for expression in re.findall(r"{{(.*?)}}", text):
         assert not re.search(r"[^\w\"'.]\s*[*/]\s|\*\*", expression), expression

@@ -9,8 +9,8 @@ from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
 import fitmat as fm
-from fitmat.examination.plots import MAPS, drawn, plot_examination
 from fitmat.judgement.examination.examining import Examination, examine
+from fitmat.reports.examination_plots import MAPS, drawn, plot_examination
 
 TRUTH = {"kd": np.array([0.3, 0.1]), "alpha": 0.1, "eta": 1.5}
 LIGHT = (10.0, 30.0, 50.0)

@@ -18,7 +18,6 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from fitmat import plots
 from fitmat.fitting import priors
 from fitmat.fitting.result import RESULTS, Fit
 from fitmat.judgement.choice import Choice
@@ -34,6 +33,7 @@ from fitmat.match.regions import GRAZING_DEG, REGIONS
 from fitmat.match.sentences import CLOSE, SIMILAR
 from fitmat.measurements.samples import Measurements
 from fitmat.models.parameters import space
+from fitmat.reports import plot
 from fitmat.studies import record
 from fitmat.studies.study import Study
 from fitmat.text import interval, with_error
@@ -46,7 +46,7 @@ POSTERIOR = "posterior-{}.nc"
 
 
 def write(folder: Path, study: Study) -> None:
-    """Write `report.html`, `fit.json` and one `posterior-MODEL.nc` per model into an existing folder."""
+    """Write `page.html`, `fit.json` and one `posterior-MODEL.nc` per model into an existing folder."""
     found = record.to_dict(study)
     (folder / "fit.json").write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     for posterior in study.posteriors:
@@ -106,7 +106,7 @@ def to_html(study: Study) -> str:
         curves=_curves(posteriors),
         residuals=_residuals(posteriors),
         enough={"tau": ENOUGH_TAU, "ess": ENOUGH_ESS, "rhat": GOOD_RHAT},
-        corners=[(p.fit.name, plots.plot_corner(p)) for p in posteriors if _has_posterior(p)],
+        corners=[(p.fit.name, plot.plot_corner(p)) for p in posteriors if _has_posterior(p)],
         **_match_parts(study.match),
         **_choice_parts(study.choice),
         identified=study.identified,
@@ -122,7 +122,7 @@ def _match_parts(match: Comparison | None) -> dict[str, Any]:
     seen = match.perceived
     return {
         "match": match,
-        "albedo": plots.plot_albedo(match).figure,
+        "albedo": plot.plot_albedo(match).figure,
         "close": CLOSE,
         "similar": SIMILAR,
         "regions": REGIONS,
@@ -131,11 +131,11 @@ def _match_parts(match: Comparison | None) -> dict[str, Any]:
         "separated": SEPARATED,
         "explains": EXPLAINS,
         "grazing_deg": GRAZING_DEG,
-        "distances_figure": plots.plot_distances(match).figure,
-        "ablation_figure": None if match.ablation is None else plots.plot_ablation(match.ablation).figure,
-        "telling_figure": plots.plot_telling(match.telling).figure if match.telling.known else None,
+        "distances_figure": plot.plot_distances(match).figure,
+        "ablation_figure": None if match.ablation is None else plot.plot_ablation(match.ablation).figure,
+        "telling_figure": plot.plot_telling(match.telling).figure if match.telling.known else None,
         "perceived": seen,
-        "spheres": None if seen is None else plots.plot_spheres(seen),
+        "spheres": None if seen is None else plot.plot_spheres(seen),
         "just_noticeable": JUST_NOTICEABLE,
         "clearly_visible": CLEARLY_VISIBLE,
         "white_luminance": WHITE_LUMINANCE,
@@ -149,8 +149,8 @@ def _choice_parts(choice: Choice | None) -> dict[str, Any]:
     predicted = any(c.left_out is not None for c in choice.candidates)
     return {
         "choice": choice,
-        "choice_picture": plots.plot_choice(choice).figure,
-        "left_out_picture": plots.plot_left_out(choice).figure if predicted else None,
+        "choice_picture": plot.plot_choice(choice).figure,
+        "left_out_picture": plot.plot_left_out(choice).figure if predicted else None,
     }
 
 
@@ -192,7 +192,7 @@ def _curves(posteriors: Sequence[Posterior]) -> list[tuple[str, Figure]]:
         figure = Figure(figsize=(max(3.6 * columns, 5.0), 2.7 * lines + 0.3), layout="constrained")
         for k, section in enumerate(found):
             ax = figure.add_subplot(lines, columns, k + 1)
-            plots.plot_section(posteriors, section, channel=int(channel), ax=ax)
+            plot.plot_section(posteriors, section, channel=int(channel), ax=ax)
         handles, labels = figure.axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), fontsize=9, frameon=False)
         pages.append((m.channels[channel], figure))
@@ -211,7 +211,7 @@ def _residuals(posteriors: Sequence[Posterior]) -> Figure:
     places = itertools.product(drawn, posteriors)
     for k, (channel, posterior) in enumerate(places):
         ax = figure.add_subplot(len(drawn), columns, k + 1)
-        plots.plot_residuals(posterior.fit, channel=channel, ax=ax)
+        plot.plot_residuals(posterior.fit, channel=channel, ax=ax)
     return figure
 
 
