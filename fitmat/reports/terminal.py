@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from fitmat.console import MOST_SAMPLED
+from fitmat.cli.session import MOST_SAMPLED
 from fitmat.fitting.result import RESULTS
 from fitmat.reports.page import rows
 from fitmat.studies.study import Study, detailed

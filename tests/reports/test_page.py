@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import fitmat
-from fitmat import console
+from fitmat.cli import session
 from fitmat.measurements.samples import Measurements
 from fitmat.models.simulation import simulate
 from fitmat.reports import page
@@ -35,7 +35,7 @@ def paint() -> Measurements:
 
 @pytest.fixture(scope="module")
 def studied() -> Study:
-    return console.study(paint(), console.Plan({name: {} for name in NAMES}, sampling=False))
+    return session.study(paint(), session.Plan({name: {} for name in NAMES}, sampling=False))
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
 import fitmat
-from fitmat import console
+from fitmat.cli import session
 from fitmat.judgement import prediction
 from fitmat.match.match import Comparison, compare
 from fitmat.models.simulation import simulate
@@ -29,7 +29,7 @@ def studied() -> tuple[list[Posterior], Comparison]:
     valid = made.valid.copy()
     valid[0, 1] = False
     made = dataclasses.replace(made, valid=valid)
-    posteriors = console.fitted(made, console.Plan({name: {} for name in NAMES}))
+    posteriors = session.fitted(made, session.Plan({name: {} for name in NAMES}))
     return posteriors, compare(*posteriors, spheres=False)
 
 

@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from fitmat import cli, console
+from fitmat.cli import commands, session
 from fitmat.uncertainty.chains import CHUNK
 
-DATA = Path(__file__).parents[1] / "data" / "synthetic"
+DATA = Path(__file__).parents[2] / "data" / "synthetic"
 HEAD = "theta_i,theta_o,brdf\n"
 QUICK = ("--models", "lambert", "--no-mcmc")
 
@@ -42,7 +42,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
     def call(*arguments: object) -> Ended:
         monkeypatch.setattr(sys, "argv", ["fitmat", *map(str, arguments)])
         with pytest.raises(SystemExit) as end:
-            cli.main()
+            commands.main()
         written = capsys.readouterr()
         return Ended(int(end.value.code or 0), written.out, written.err)
 
@@ -290,7 +290,7 @@ def test_same_seed_same_numbers(run, tmp_path):
 
 
 def test_interrupted_sampling_keeps_what_is_done(run, tmp_path, monkeypatch):
-    sample = console.sample
+    sample = session.sample
 
     def interrupted(found: Any, *, seed: int, progress: Callable[[int, int], None], checkpoint: Path) -> Any:
         def tick(done: int, total: int) -> None:
@@ -299,7 +299,7 @@ def test_interrupted_sampling_keeps_what_is_done(run, tmp_path, monkeypatch):
 
         return sample(found, seed=seed, progress=tick, checkpoint=checkpoint)
 
-    monkeypatch.setattr(console, "sample", interrupted)
+    monkeypatch.setattr(session, "sample", interrupted)
     ended = run("fit", DATA / "sparse.csv", "--models", "lambert,lambert+phong", "--out", tmp_path / "out")
     assert ended.code == 3
     assert ended.err == ""
@@ -316,7 +316,7 @@ def test_interrupted_computation_leaves_nothing(run, tmp_path, monkeypatch, room
     def interrupt(*_: object, **__: object) -> None:
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(console, room, interrupt)
+    monkeypatch.setattr(session, room, interrupt)
     ended = run("fit", DATA / "sparse.csv", "--no-mcmc", "--out", tmp_path / "out")
     assert_refused(ended, "interrupted before the end; no report was written", code=130)
     assert os.listdir(tmp_path) == []
@@ -381,7 +381,7 @@ def test_start_up_is_light(environment):
 import sys, fitmat, fitmat.cli
 sys.argv = ["fitmat", "fit", "--help"]
 try:
-    fitmat.cli.main()
+    fitmat.cli.commands.main()
 except SystemExit:
     {heavy}
     sys.exit(", ".join(heavy) or 0)

@@ -10,7 +10,7 @@ from typing import Any
 
 import typer
 
-from fitmat import flags, options, process
+from fitmat.cli import flags, options, process
 from fitmat.errors import FitmatError
 
 DEFAULT_MODELS = "lambert+blinn-phong,lambert+ggx"
@@ -78,23 +78,24 @@ def fit(
 ) -> None:
     """Fit models to a file of measurements and write a report with the Phong–microfacet match."""
     _setup()
-    from fitmat import console, files
+    from fitmat import files
+    from fitmat.cli import session
     from fitmat.fitting import known, priors
     from fitmat.measurements.samples import Measurements
     from fitmat.models.parameters import assignments
     from fitmat.reports import page, terminal
 
     fixed, believed = assignments(fix or [], "--fix"), priors.assignments(prior or [])
-    measurements = console.source(file, reading | {"instrument": instrument})
+    measurements = session.source(file, reading | {"instrument": instrument})
     shown = measurements if isinstance(measurements, Measurements) else measurements.part
-    known = known.prepared(console.model_names(models, shown), shown, ior=ior, tilt=tilt)
+    known = known.prepared(session.model_names(models, shown), shown, ior=ior, tilt=tilt)
     target = out or files.default(file)
     with files.new(target, force=force, stale=page.POSTERIOR.format("*")) as draft:
         process.leave_on_interrupt(draft)
-        plan = console.Plan(
+        plan = session.Plan(
             known, fixed, believed, loss, masking, not no_mcmc, seed, check_posterior, files.resumed(target)
         )
-        found = console.study(measurements, plan)
+        found = session.study(measurements, plan)
         page.write(draft, found)
     if not no_mcmc:
         files.discard(files.resumed(target))
@@ -130,19 +131,19 @@ def simulate(
 ) -> None:
     """Simulate measurements of a known material, to test an instrument's plan or fitmat itself."""
     _setup()
-    from fitmat import simulation
+    from fitmat.cli import simulate
 
     if catalogue is not None:
-        written = simulation.write_catalogue(catalogue, force=force)
+        written = simulate.write_catalogue(catalogue, force=force)
     else:
         angles = (
-            simulation.angles(theta_i, "--theta-i", lowest=0.0),
-            simulation.angles(theta_o, "--theta-o"),
-            simulation.angles(phi, "--phi", lowest=0.0, highest=360.0),
-            simulation.angles(phi_i, "--phi-i", lowest=0.0, highest=360.0),
+            simulate.angles(theta_i, "--theta-i", lowest=0.0),
+            simulate.angles(theta_o, "--theta-o"),
+            simulate.angles(phi, "--phi", lowest=0.0, highest=360.0),
+            simulate.angles(phi_i, "--phi-i", lowest=0.0, highest=360.0),
         )
-        truth = simulation.truth(model, set_ or [], masking)
-        written = simulation.write_simulation(
+        truth = simulate.truth(model, set_ or [], masking)
+        written = simulate.write_simulation(
             out, truth, angles, noise=(noise, floor, seed), instrument=instrument, force=force
         )
     typer.echo("\n".join(str(path) for path in written))
@@ -162,11 +163,11 @@ def check(
 ) -> None:
     """Describe a file before any fit: what was measured where, how consistently, and what can be learnt from it."""
     _setup()
-    from fitmat import checking
+    from fitmat.cli import check
     from fitmat.measurements.reader import read
 
-    found = checking.checked(read(file, **reading, instrument=instrument), plot, force=force)
-    typer.echo(checking.as_json(found) if json_ else str(found))
+    found = check.checked(read(file, **reading, instrument=instrument), plot, force=force)
+    typer.echo(check.as_json(found) if json_ else str(found))
     if plot is None and not json_:
         typer.echo(f"See what was measured where: fitmat check {file} --plot coverage.png")
 
@@ -200,7 +201,7 @@ def models(
     check: options.Check = False,
 ) -> None:
     """List the models, or print the manual page of one: formula, parameters, limits, reference, laws."""
-    from fitmat import manual
+    from fitmat.cli import manual
 
     if check:
         _setup()
@@ -233,21 +234,21 @@ def design(
 ) -> None:
     """Say which angles to measure next, and by how much they would narrow what is not yet known."""
     _setup()
-    from fitmat import console, planning
+    from fitmat.cli import design, session
     from fitmat.measurements.reader import read
     from fitmat.models.parameters import assignments
 
     measurements = read(file, **reading, instrument=instrument)
-    known = {name: {} for name in console.model_names(models, measurements)}
-    posteriors = console.fitted(measurements, console.Plan(known, assignments(fix or [], "--fix"), seed=seed))
-    found = planning.planned(posteriors, for_, kind=kind, count=count, plot=plot, force=force)
-    typer.echo(planning.as_json(found) if json_ else planning.as_text(found))
+    known = {name: {} for name in session.model_names(models, measurements)}
+    posteriors = session.fitted(measurements, session.Plan(known, assignments(fix or [], "--fix"), seed=seed))
+    found = design.planned(posteriors, for_, kind=kind, count=count, plot=plot, force=force)
+    typer.echo(design.as_json(found) if json_ else design.as_text(found))
 
 
 @app.command()
 def losses() -> None:
     """List what a fit can minimise, by name: the default, other likelihoods, and the objectives of the literature."""
-    from fitmat import manual
+    from fitmat.cli import manual
 
     manual.list_losses()
 

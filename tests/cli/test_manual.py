@@ -2,7 +2,7 @@
 
 import pytest
 
-from fitmat import manual
+from fitmat.cli import manual
 from fitmat.models.lobes.phong import BlinnPhong
 from fitmat.models.registry import LOBES
 

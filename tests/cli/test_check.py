@@ -10,7 +10,7 @@ import pytest
 import test_cli
 from test_cli import Run, assert_refused, curves, shell, strict
 
-from fitmat import console
+from fitmat.cli import session
 from fitmat.errors import FitmatError
 from fitmat.measurements.instrument import UNKNOWN_SCALE, Instrument
 from fitmat.measurements.samples import Measurements
@@ -273,7 +273,7 @@ def reached(monkeypatch: pytest.MonkeyPatch) -> list[Measurements]:
         arrived.append(measurements)
         raise FitmatError("arrived")
 
-    monkeypatch.setattr(console, "study", study)
+    monkeypatch.setattr(session, "study", study)
     return arrived
 
 

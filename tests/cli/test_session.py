@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import fitmat
-from fitmat import console
+from fitmat.cli import session
 from fitmat.errors import ModelError
 from fitmat.models.simulation import simulate
 from fitmat.reports import terminal
@@ -20,7 +20,7 @@ def posterior() -> Posterior:
     truth = fitmat.model("lambert+ggx", channels=3, kd=np.array([0.4, 0.1, 0.2]), alpha=0.3)
     angles = np.deg2rad([20, 45, 70]), np.deg2rad(np.arange(-80, 81, 10))
     made = simulate(truth, *angles, relative_noise=0.02, absolute_noise=1e-3, seed=1)
-    return console.fitted(made, console.Plan({"lambert+ggx": {}}))[0]
+    return session.fitted(made, session.Plan({"lambert+ggx": {}}))[0]
 
 
 @pytest.fixture(autouse=True)
@@ -29,12 +29,12 @@ def narrow(monkeypatch):
 
 
 def test_model_names_are_tidied():
-    assert console.model_names(" lambert + GGX,phong,,lambert+ggx") == ["lambert+ggx", "phong"]
+    assert session.model_names(" lambert + GGX,phong,,lambert+ggx") == ["lambert+ggx", "phong"]
 
 
 def test_no_model_name():
     with pytest.raises(ModelError, match="no model given; try --models lambert"):
-        console.model_names(" , ")
+        session.model_names(" , ")
 
 
 def test_show_fits_80_columns(posterior, capsys, tmp_path):
@@ -70,8 +70,8 @@ def test_options_go_to_the_models_that_have_them(posterior):
     fixed = {"exponent": np.array([20.0]), "kd": np.array([0.3])}
     names = ["lambert+phong", "lambert+ggx"]
     measurements = posterior.fit.measurements
-    plan = console.Plan({name: {} for name in names}, fixed, masking="separable")
-    assert [sorted(p.fit.held) for p in console.fitted(measurements, plan)] == [["exponent", "kd"], ["kd"]]
+    plan = session.Plan({name: {} for name in names}, fixed, masking="separable")
+    assert [sorted(p.fit.held) for p in session.fitted(measurements, plan)] == [["exponent", "kd"], ["kd"]]
 
 
 @pytest.mark.parametrize(
@@ -85,7 +85,7 @@ def test_options_go_to_the_models_that_have_them(posterior):
 def test_options_that_concern_no_model(posterior, chosen, sentence):
     measurements = posterior.fit.measurements
     with pytest.raises(ModelError, match=sentence):
-        console.study(measurements, console.Plan({"lambert": {}}, sampling=False, **chosen))
+        session.study(measurements, session.Plan({"lambert": {}}, sampling=False, **chosen))
 
 
 def test_handler_is_restored_after_sampling(posterior, monkeypatch):
@@ -97,8 +97,8 @@ def test_handler_is_restored_after_sampling(posterior, monkeypatch):
         progress(1, 2)
         return posterior
 
-    monkeypatch.setattr(console, "sample", sample)
-    monkeypatch.setattr(console, "concluded", lambda found, match, **_: Study(tuple(found), match))
-    console.study(posterior.fit.measurements, console.Plan({"lambert+ggx": {}}))
+    monkeypatch.setattr(session, "sample", sample)
+    monkeypatch.setattr(session, "concluded", lambda found, match, **_: Study(tuple(found), match))
+    session.study(posterior.fit.measurements, session.Plan({"lambert+ggx": {}}))
     assert seen[0] is not before
     assert signal.getsignal(signal.SIGINT) is before
