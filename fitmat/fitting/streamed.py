@@ -59,7 +59,7 @@ def fit_chunks(
     together to the maximum of the likelihood of all rows; bounds are kept by projection (Bertsekas 1982, eq. 32).
 
     Args:
-        chunks: A file, from `fitmat.measurements.large.chunks.scan`, or measurements in memory, from `fitmat.measurements.large.stream.held`.
+        chunks: A file, from `large.chunks.scan`, or measurements in memory, from `large.stream.held`.
         to: A model name ("lambert+ggx"), or a model whose shapes and static choices are used.
         fixed: Parameters to hold, by name: `{"ks": 1.0}`.
         priors: What is known beforehand, by name, as in `fitting.fit`.

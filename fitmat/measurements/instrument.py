@@ -1,6 +1,6 @@
 """Instrument: what lies between a surface and the numbers of a file, apart from its noise.
 
-A description only; `fitmat.models.around.instrument` is the model that follows from it, `fitmat.measurements.noise` the scatter.
+A description only; `models.around.instrument` is the model that follows from it, `measurements.noise` the scatter.
 """
 
 import dataclasses

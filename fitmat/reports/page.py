@@ -86,7 +86,7 @@ def rows(posterior: Posterior) -> list[dict[str, str]]:
 def to_html(study: Study) -> str:
     """The page: verdict, pictures, then numbers; pictures are embedded, nothing is fetched."""
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("fitmat"), autoescape=True, trim_blocks=True, lstrip_blocks=True
+        loader=jinja2.PackageLoader("fitmat.reports"), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters |= {"png": _png, "subscripted": _subscripted}
     posteriors = study.posteriors

@@ -13,16 +13,17 @@ import fitmat as fm
 from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
 from fitmat.judgement.metrics import fit_metrics
-from fitmat.match import match, sentences
+from fitmat.match import sentences
 from fitmat.match.ablation import EXPLAINS, TERMS, Ablation
 from fitmat.match.appearance import spheres
 from fitmat.match.discernibility import SEPARATED, Telling
 from fitmat.match.distances import METRICS
 from fitmat.match.imitation import Imitation
-from fitmat.match.match import ALBEDO_ANGLES, Comparison, compare
+from fitmat.match.match import ALBEDO_ANGLES, IMITATED, Comparison, compare
 from fitmat.match.regions import GRAZING_DEG, REGIONS
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha, fitted_alpha, fitted_exponent
+from fitmat.reports import page as report
 from fitmat.reports import plot
 from fitmat.uncertainty.estimate import Estimate
 from fitmat.uncertainty.posterior import Posterior
@@ -230,7 +231,7 @@ def imitated(what: AbstractBRDF, into: AbstractBRDF, metric: str) -> Imitation:
 
 def test_each_model_imitates_the_other(match: Comparison, monkeypatch: pytest.MonkeyPatch) -> None:
     """In four metrics, both ways, at the best fits."""
-    monkeypatch.setattr(match, "imitate", lambda fit, into, metric: imitated(fit.model, into, metric))
+    monkeypatch.setattr("fitmat.match.match.imitate", lambda fit, into, metric: imitated(fit.model, into, metric))
     found = dataclasses.replace(match).imitations
     one, other = "lambert+blinn-phong", "lambert+ggx"
     metrics = ("relative", "ngan", "cube-root", "log-ratio")
@@ -309,13 +310,13 @@ def test_the_pictures_show_the_numbers(match: Comparison) -> None:
 @pytest.mark.parametrize("known", [True, False])
 def test_the_page_tells_the_match_in_words(match: Comparison, known: bool) -> None:
     """Every variable is there, and the sentences say what the numbers do."""
-    folder = jinja2.FileSystemLoader(Path(sentences.__file__).with_name("templates"))
+    folder = jinja2.FileSystemLoader(Path(report.__file__).with_name("templates"))
     environment = jinja2.Environment(loader=folder, autoescape=True, undefined=jinja2.StrictUndefined)
     environment.filters["png"] = str
     telling = dataclasses.replace(match.telling, known=known)
     one = dataclasses.replace(match, telling=telling, ablation=match.ablation if known else None)
     fits = match.empirical.fit, match.microfacet.fit
-    both = [imitated(fits[1 - k].model, fits[k].model, metric) for k in (0, 1) for metric in match.IMITATED]
+    both = [imitated(fits[1 - k].model, fits[k].model, metric) for k in (0, 1) for metric in IMITATED]
     one.__dict__["imitations"] = tuple(both)  # what is cached is not asked for
     page = environment.get_template("match.html").render(
         match=one,

@@ -1,4 +1,4 @@
-"""The page and the JSON object of a run: complete, strict, self-contained, and safe whatever the names are."""
+"""The report and the JSON object of a run: complete, strict, self-contained, and safe whatever the names are."""
 
 import base64
 import dataclasses
@@ -39,7 +39,7 @@ def studied() -> Study:
 
 
 @pytest.fixture(scope="module")
-def page(studied: Study) -> str:
+def report(studied: Study) -> str:
     return page.to_html(studied)
 
 
@@ -75,9 +75,9 @@ class Page(html.parser.HTMLParser):
         return " ".join(" ".join(self.words).split())
 
 
-def test_page_is_well_formed_and_says_what_was_found(page, studied):
+def test_page_is_well_formed_and_says_what_was_found(report, studied):
     posteriors, match = studied.posteriors, studied.match
-    read = Page(page)
+    read = Page(report)
     assert read.open == []
     assert match is not None
     assert match.verdict in read.text
@@ -93,9 +93,9 @@ def test_page_is_well_formed_and_says_what_was_found(page, studied):
     assert "nan" not in read.text.lower().replace("illuminan", "")
 
 
-def test_pictures_are_embedded_and_whole(page):
+def test_pictures_are_embedded_and_whole(report):
     """Curves and residuals of the channels; albedo, distances, causes, noise and spheres; choice; two corner plots."""
-    links = Page(page).links
+    links = Page(report).links
     assert len(links) == 3 + 1 + 5 + 2 + 2
     for link in links:
         kind, _, data = link.partition(",")
@@ -108,8 +108,8 @@ def test_pictures_are_embedded_and_whole(page):
         assert 100 < height < 2000
 
 
-def test_nothing_is_fetched(page):
-    assert not re.search(r"https?://|//[a-z]|@import|url\(", re.sub(r"base64,[^\"]*", "", page))
+def test_nothing_is_fetched(report):
+    assert not re.search(r"https?://|//[a-z]|@import|url\(", re.sub(r"base64,[^\"]*", "", report))
 
 
 def test_names_are_escaped(studied):
@@ -230,6 +230,6 @@ def test_what_is_not_determined_shows_no_error(studied):
 
 def test_template_has_no_arithmetic():
     """A report formats; what it shows is computed elsewhere."""
-    text = (Path(page.__file__).parents[1] / "templates" / "report.html").read_text()
+    text = (Path(page.__file__).parent / "templates" / "report.html").read_text()
     for expression in re.findall(r"{{(.*?)}}", text):
         assert not re.search(r"[^\w\"'.]\s*[*/]\s|\*\*", expression), expression

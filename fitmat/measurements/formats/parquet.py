@@ -59,7 +59,7 @@ def load(path: str | os.PathLike[str]) -> Table:
 
 
 def dump(measurements: Measurements) -> bytes:
-    """The columns of `fitmat.measurements.formats.csv.columns` in full float64: what is read back is what was written."""
+    """The columns of `csv.columns` in full float64: what is read back is what was written."""
     buffer = io.BytesIO()
     pl.DataFrame(csv.columns(measurements)).write_parquet(buffer)
     return buffer.getvalue()

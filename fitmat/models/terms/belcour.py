@@ -1,6 +1,6 @@
 """Belcour's decomposition of the Fresnel curve: Schlick's two terms and two functions found from real materials.
 
-Approximates the exact curves of `fitmat.models.terms.fresnel` and measures by how much; it has no exact formula of its own, and does
+Approximates the exact curves of `terms.fresnel` and measures by how much; it has no exact formula of its own, and does
 not integrate against a lobe (its terms c(1−c)ʲ are what makes that possible in closed form).
 """
 
@@ -29,7 +29,7 @@ TRAINING: tuple[str, ...] = (
     "Au", "Ag", "Cu", "Al", "Cr", "Fe", "Ni", "Co", "Ti", "W", "Pt", "Mo", "Zn", "brass", "steel", "Si", "Ge",
     "N-BK7", "SF11", "fused-silica", "soda-lime", "sapphire", "diamond", "PET", "water", "ice",
 )  # fmt: skip
-"""The materials whose curves, 400 to 700 nm in steps of 10, the basis was found from; names of `fitmat.models.refractive_index`."""
+"""The materials whose curves, 400 to 700 nm in steps of 10, the basis was found from; names of `refractive_index`."""
 
 POWERS = np.array([2, 3, 6, 12])
 """The exponents j of the terms c(1−c)ʲ, all 0 at normal incidence and at grazing."""

@@ -3,7 +3,7 @@
 It knows no format: valid samples and faults in their structure come from the tests of each format. Nothing is kept but
 an input that failed.
 
-    python tests/fuzz.py --inputs 200000 --reader merl --seed 0
+    python tests/measurements/formats/fuzz.py --inputs 200000 --reader merl --seed 0
 """
 
 import argparse
@@ -425,7 +425,7 @@ def _kept(source: Any) -> Path:
 
 def measured_files() -> Path | None:
     """The folder of shared measurements, where there is one."""
-    folder = Path(os.environ.get("FITMAT_DATA") or Path(__file__).parents[3] / "shared" / "data")
+    folder = Path(os.environ.get("FITMAT_DATA") or Path(__file__).parents[4] / "shared" / "data")
     return folder if folder.is_dir() else None
 
 
