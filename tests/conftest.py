@@ -1,7 +1,8 @@
-"""What every test stands on: float64, no programs cached on disk, reproducible draws, shared directions."""
+"""What every test stands on: float64, compiled programs shared by all workers, reproducible draws, shared directions."""
 
 import gc
 import os
+import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
@@ -12,17 +13,40 @@ import numpy as np
 import pytest
 
 jax.config.update("jax_enable_x64", True)
-jax.config.update("jax_enable_compilation_cache", False)
 hypothesis.settings.register_profile("fitmat", derandomize=True, deadline=None, database=None)
 hypothesis.settings.load_profile("fitmat")
 
 
+MOST_MAPS = 30_000
+"""Memory maps of a process from which on it lets go of its compiled programs; Linux grants 65,530."""
+
+_COMPILED = pytest.StashKey[tempfile.TemporaryDirectory[str]]()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Share one folder of compiled programs between all workers, for this run; its name is inherited from the first."""
+    if "FITMAT_COMPILED" not in os.environ:
+        folder = tempfile.TemporaryDirectory(prefix="fitmat-tests-", ignore_cleanup_errors=True)
+        config.stash[_COMPILED] = folder
+        os.environ["FITMAT_COMPILED"] = folder.name
+    jax.config.update("jax_compilation_cache_dir", os.environ["FITMAT_COMPILED"])
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Remove the folder where this process made it."""
+    if _COMPILED in config.stash:
+        config.stash[_COMPILED].cleanup()
+
+
 @pytest.fixture(autouse=True, scope="module")
 def _forget_programs() -> Iterator[None]:
-    """Let go of compiled programs after each file: together they need more memory maps than Linux grants a process."""
+    """Let go of compiled programs after a file if there are many: a process may hold only so many memory maps."""
     yield
-    jax.clear_caches()
-    gc.collect()
+    maps = Path("/proc/self/maps")
+    if not maps.exists() or maps.read_bytes().count(b"\n") > MOST_MAPS:
+        jax.clear_caches()
+        gc.collect()
 
 
 Hemisphere = Callable[[int, int], np.ndarray]

@@ -55,7 +55,7 @@ def truth(name: str | None, settings: Sequence[str], masking: str | None) -> Abs
     """The model to simulate; lists of values make it a model of several channels.
 
     Raises:
-        ModelError: no name, or what `brdf.model` refuses.
+        ModelError: no name, or what `models.registry.model` refuses.
     """
     if name is None:
         raise ModelError("name a model to simulate, for example lambert+ggx, or give --catalogue FOLDER.")

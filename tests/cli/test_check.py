@@ -7,17 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import test_cli
-from test_cli import Run, assert_refused, curves, shell, strict
+import test_commands
+from test_commands import Run, assert_refused, curves, shell, strict
 
 from fitmat.cli import session
 from fitmat.errors import FitmatError
 from fitmat.measurements.instrument import UNKNOWN_SCALE, Instrument
 from fitmat.measurements.samples import Measurements
 
-run, environment = test_cli.run, test_cli.environment
+run, environment = test_commands.run, test_commands.environment
 
-SPARSE = test_cli.DATA / "sparse.csv"
+SPARSE = test_commands.DATA / "sparse.csv"
 
 SEVEN_DIGITS = 5.1e-7
 """Relative: half a unit of the seventh digit, to which CSV values are written."""
@@ -72,7 +72,7 @@ def test_check_warns_of_values_that_reflect_more_than_falls_on_the_sample(run: R
 
 
 ODD: dict[str, str] = {
-    "one row": test_cli.HEAD + "30,30,0.5\n",
+    "one row": test_commands.HEAD + "30,30,0.5\n",
     "all zero": curves(lambda i, o: 0),
     "all negative": curves(lambda i, o: -1 - 0.01 * (o % 3)),
     "large": curves(lambda i, o: 1e100 * (1 + 0.01 * (o % 3))),

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 import fitmat as fm
-from fitmat.cli import design
+from fitmat.cli import design as plan
 from fitmat.errors import FitmatError, OutputError
 from fitmat.fitting.result import Fit
 from fitmat.judgement.design.candidates import Limits, proposed
@@ -137,7 +137,7 @@ def test_the_match_is_asked_where_the_models_differ(blind: Fit) -> None:
     chosen = np.argmax(design.gains)
     assert apart[chosen] > np.quantile(apart, 0.95)
     assert design.rival is rival
-    assert "To tell lambert+ggx from lambert," in design.as_text(found)
+    assert "To tell lambert+ggx from lambert," in plan.as_text(design)
 
 
 def test_what_an_instrument_cannot_do_is_left_out(lambert: Fit) -> None:
@@ -171,18 +171,18 @@ def test_what_cannot_be_planned_is_refused(lambert: Fit) -> None:
 
 def test_a_plan_is_shown_as_text_as_json_and_drawn(lambert: Fit, tmp_path: Path) -> None:
     posterior, picture = fm.laplace(lambert, seed=1), tmp_path / "plan.png"
-    found = design.planned([posterior], "kd", count=2, plot=picture)
+    found = plan.planned([posterior], "kd", count=2, plot=picture)
     with Image.open(picture) as image:
         assert min(image.size) > 300
-    assert "For kd of lambert, the sample that tells most: light at" in design.as_text(found)
-    assert "kd ± 0.0041 → ± 0.004" in design.as_text(found)
-    told = json.loads(design.as_json(found))
+    assert "For kd of lambert, the sample that tells most: light at" in plan.as_text(found)
+    assert "kd ± 0.0041 → ± 0.004" in plan.as_text(found)
+    told = json.loads(plan.as_json(found))
     assert [len(p["theta_o_deg"]) for p in told["proposals"]] == [1, 1]
     assert told["sd_before"]["kd"] == {"sd": pytest.approx(found.sd[0]), "of": "value"}
     with pytest.raises(OutputError, match=r"plan.png: already exists; choose another name, or --force"):
-        design.planned([posterior], "kd", plot=picture)
+        plan.planned([posterior], "kd", plot=picture)
     with pytest.raises(OutputError, match=r"plan.txt: no picture, expected a name that ends in png, svg, pdf"):
-        design.planned([posterior], "kd", plot=tmp_path / "plan.txt")
+        plan.planned([posterior], "kd", plot=tmp_path / "plan.txt")
     curves = fm.next_angles(posterior, kind="curve", count=1)
     samples = curves.candidates.used.sum(axis=1)
     np.testing.assert_allclose(curves.gains, np.sqrt(1 + samples / 60), rtol=CLOSED)
