@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Array
 
 from fitmat._types import Scalar, Spectrum
+from fitmat.maths.arrays import library
 from fitmat.models.parameters import param
 
 Numbers = TypeVar("Numbers", Array, np.ndarray)
@@ -137,11 +138,6 @@ class White(AbstractFresnel):
     def normal_reflectance(self) -> Spectrum:
         """1."""
         return jnp.ones(())
-
-
-def library(*values: Any) -> Any:
-    """`jax.numpy` where a value is a JAX array, else NumPy."""
-    return jnp if any(isinstance(value, jax.Array) for value in values) else np
 
 
 def dielectric(cos_d: Numbers | float, eta: Numbers) -> Numbers:
