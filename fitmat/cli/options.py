@@ -97,7 +97,10 @@ Prior = Annotated[
 
 CheckPosterior = Annotated[
     bool,
-    typer.Option("--check-posterior", help="Sample each posterior a second time, with NUTS, and compare."),
+    typer.Option(
+        "--check-posterior",
+        help="Sample each posterior a second time, with NUTS (pip install 'fitmat[nuts]'), and compare.",
+    ),
 ]
 
 For = Annotated[

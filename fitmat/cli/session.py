@@ -31,6 +31,7 @@ from fitmat.measurements.samples import Measurements
 from fitmat.models.parameters import entries
 from fitmat.models.registry import LOBES, lobe_names, model, normalised
 from fitmat.studies.study import Study, concluded
+from fitmat.uncertainty import second_sampler
 from fitmat.uncertainty.chains import resumable_steps, sample
 from fitmat.uncertainty.laplace import laplace, laplace_each
 from fitmat.uncertainty.posterior import Posterior
@@ -108,6 +109,8 @@ def study(measurements: Measurements | Rows, plan: Plan) -> Study:
 
     An interrupt during sampling keeps what was done and leaves the remaining models to Laplace's approximation.
     """
+    if plan.second_opinion:
+        second_sampler.require()
     jobs = {name: _options(name, plan) for name in plan.known}
     with _bar() as bar:
         first = _fitted(measurements, jobs, bar, plan)

@@ -42,11 +42,11 @@ from fitmat.uncertainty.quantities import derived, parameters
 
 DPI = 96
 CHANNELS_DRAWN = 3
-POSTERIOR = "posterior-{}.nc"
+POSTERIOR = "posterior-{}.parquet"
 
 
 def write(folder: Path, study: Study) -> None:
-    """Write `page.html`, `fit.json` and one `posterior-MODEL.nc` per model into an existing folder."""
+    """Write `report.html`, `fit.json` and one `posterior-MODEL.parquet` per model into an existing folder."""
     found = record.to_dict(study)
     (folder / "fit.json").write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     for posterior in study.posteriors:

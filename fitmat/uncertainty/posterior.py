@@ -5,13 +5,18 @@ Draws nothing itself; `uncertainty` does.
 
 import dataclasses
 import io
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 from jaxtyping import Float
 
+from fitmat.errors import OutputError
+from fitmat.extras import needed
 from fitmat.fitting.result import Fit
+from fitmat.models.parameters import Entry
 from fitmat.text import html_table, text_table, with_error
 
 VERDICTS = {
@@ -149,27 +154,68 @@ class Posterior:
         chosen = np.linspace(0, len(self.values) - 1, min(count, len(self.values))).astype(int)
         return self.values[chosen], self.discrepancy[chosen]
 
-    def save(self, path: str | Path) -> None:
-        """Write the draws as ArviZ netCDF (group `posterior`, dimensions chain = walker, draw = step)."""
-        from arviz_base import from_dict
+    def table(self) -> pl.DataFrame:
+        """The draws as a table: chain (walker), draw (step), each free parameter (and channel), discrepancy."""
+        free, s = self._free()
+        walker, step = (k.ravel() for k in np.indices(s.shape))
+        numbers = {name: part.ravel() for entry, part in free for name, part in self._channels(entry, part)}
+        return pl.DataFrame({"chain": walker, "draw": step, **numbers, "discrepancy": s.ravel()})
 
-        chain = self.values[None] if self.chain is None else np.swapaxes(self.chain, 0, 1)
-        variables: dict[str, np.ndarray] = {}
-        free = [e for e in self.fit.entries if e.name not in self.fit.held]
-        start = 0
-        for entry in free:
-            part = chain[..., start : start + entry.size] if self.chain is not None else chain[..., entry.place]
-            variables[entry.name] = part if entry.shape else part[..., 0]
-            start += entry.size
-        variables["discrepancy"] = self.discrepancy[None] if self.chain is None else chain[..., -1]
-        attributes: dict[str, Any] = {"model": self.fit.name, "method": self.method, "verdict": self.verdict}
+    def description(self) -> dict[str, str]:
+        """What a file of the draws says of them: model, method, verdict, units; of chains also seed and burn-in."""
+        known = {"model": self.fit.name, "method": self.method, "verdict": self.verdict}
         if self.diagnostics is not None:
-            attributes |= {"seed": str(self.diagnostics.seed), "burn_in": self.diagnostics.burn_in}
-        tree = from_dict({"posterior": variables}, attrs={"posterior": attributes})
+            known |= {"seed": str(self.diagnostics.seed), "burn_in": str(self.diagnostics.burn_in)}
+        units = {e.name: e.param.unit for e in self.fit.entries if e.name not in self.fit.held}
+        return known | {"units": json.dumps(units, ensure_ascii=False)}
+
+    def to_arviz(self) -> Any:
+        """The draws as ArviZ's data tree: group `posterior`, dimensions chain (walker) and draw (step).
+
+        Raises:
+            FitmatError: ArviZ is missing.
+        """
+        arviz = needed("arviz_base", "the posterior in ArviZ's form")
+        free, s = self._free()
+        variables = {entry.name: part if entry.shape else part[..., 0] for entry, part in free}
+        return arviz.from_dict({"posterior": variables | {"discrepancy": s}}, attrs={"posterior": self.description()})
+
+    def save(self, path: str | Path) -> None:
+        """Write the draws, in physical units.
+
+        Args:
+            path: `.parquet` holds `table`, and `description` as its metadata; `.nc` is ArviZ's netCDF.
+
+        Raises:
+            FitmatError: the suffix is another, or a package is missing.
+            OSError: the file cannot be written.
+        """
+        path = Path(path)
+        if path.suffix not in (".parquet", ".nc"):
+            raise OutputError(f"{path}: draws are written to .parquet or .nc; end the name with one of these.")
         # HDF5 crashes the process where the disk is full, so that Python writes the file.
         memory = io.BytesIO()
-        tree.to_netcdf(memory, engine="h5netcdf")
-        Path(path).write_bytes(memory.getvalue())
+        if path.suffix == ".nc":
+            needed("h5netcdf", f"writing {path.name}")
+            self.to_arviz().to_netcdf(memory, engine="h5netcdf")
+        else:
+            self.table().write_parquet(memory, metadata=self.description())
+        path.write_bytes(memory.getvalue())
+
+    def _free(self) -> tuple[list[tuple[Entry, np.ndarray]], np.ndarray]:
+        """Free parameters with their draws, (chains, draws, size), and s, (chains, draws)."""
+        free = [e for e in self.fit.entries if e.name not in self.fit.held]
+        if self.chain is None:
+            return [(e, self.values[None, :, e.place]) for e in free], self.discrepancy[None]
+        chain = np.swapaxes(self.chain, 0, 1)
+        ends = np.cumsum([e.size for e in free])
+        return list(zip(free, np.split(chain, ends, axis=-1), strict=False)), chain[..., -1]
+
+    def _channels(self, entry: Entry, part: np.ndarray) -> list[tuple[str, np.ndarray]]:
+        """The draws of a parameter channel by channel, each with its name."""
+        channels = self.fit.measurements.channels
+        several = entry.shape and len(channels) > 1
+        return [(f"{entry.name} {channels[k]}" if several else entry.name, part[..., k]) for k in range(entry.size)]
 
 
 def split_rhat(chain: Float[np.ndarray, "steps walkers d"]) -> Float[np.ndarray, " d"]:

@@ -5,6 +5,7 @@ imports blackjax.
 """
 
 import dataclasses
+from types import ModuleType
 from typing import Any
 
 import equinox as eqx
@@ -14,6 +15,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat.errors import FitmatError
+from fitmat.extras import needed
 from fitmat.fitting.likelihood import mapped
 from fitmat.fitting.result import Fit
 from fitmat.models.parameters import space
@@ -128,6 +130,15 @@ class SecondOpinion:
         return html_table(self.words, ("parameter", "mean", "2.5 %", "97.5 %", "verdict"), self._rows())
 
 
+def require() -> ModuleType:
+    """The package blackjax; asked for before anything is fitted that it shall check.
+
+    Raises:
+        FitmatError: it is missing; names the command that installs it.
+    """
+    return needed("blackjax", "checking a posterior with NUTS")
+
+
 def check_posterior(
     posterior: Posterior, *, seed: int, chains: int = 4, warmup: int = 500, count: int = 1000
 ) -> SecondOpinion:
@@ -146,8 +157,9 @@ def check_posterior(
         count: Draws of each that are kept.
 
     Raises:
-        FitmatError: the posterior holds no chain.
+        FitmatError: the posterior holds no chain, or blackjax is missing.
     """
+    require()
     if posterior.chain is None:
         raise FitmatError(
             f"{posterior.fit.name}: was not sampled, so that there is no chain to check; sample it first."
@@ -238,8 +250,7 @@ def _chains(
     steps: tuple[int, int],
 ) -> tuple[Array, Array]:
     """NUTS from several starts: sampled coordinates, (chains, draws, d), and whether each step diverged."""
-    import blackjax
-
+    blackjax = require()
     template, data = eqx.combine(arrays, static)
     weights = np.array(where.weights, int)
 
@@ -260,7 +271,7 @@ def _chains(
     def one(chain: tuple[Array, Array]) -> tuple[Array, Array]:
         first, second = jax.random.split(chain[0])
         adaptation = blackjax.window_adaptation(blackjax.nuts, target, is_mass_matrix_diagonal=False)
-        (state, parameters), _ = adaptation.run(first, chain[1], num_steps=steps[0])  # pyright: ignore[reportCallIssue]
+        (state, parameters), _ = adaptation.run(first, chain[1], num_steps=steps[0])
         kernel = blackjax.nuts(target, **parameters)
 
         def step(state: Any, key: Array) -> tuple[Any, tuple[Array, Array]]:

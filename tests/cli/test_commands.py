@@ -256,7 +256,7 @@ def test_out_is_refused_then_replaced_by_force(run, tmp_path):
     out = tmp_path / "out"
     assert run("fit", DATA / "sparse.csv", *QUICK, "--out", out).code == 0
     before = {path.name: path.read_bytes() for path in out.iterdir()}
-    assert sorted(before) == ["fit.json", "posterior-lambert.nc", "report.html"]
+    assert sorted(before) == ["fit.json", "posterior-lambert.parquet", "report.html"]
     assert_refused(
         run("fit", DATA / "noisy.csv", *QUICK, "--out", out), "already exists; give another --out DIR, or --f"
     )
@@ -265,7 +265,7 @@ def test_out_is_refused_then_replaced_by_force(run, tmp_path):
     other = ("--models", "lambert+phong", "--fix", "exponent=20", "--fix", "ks=0.1", "--no-mcmc")
     assert run("fit", DATA / "sparse.csv", *other, "--out", out, "--force").code in (0, 3)
     names = sorted(path.name for path in out.iterdir())
-    assert names == ["fit.json", "notes.txt", "posterior-lambert+phong.nc", "report.html"]
+    assert names == ["fit.json", "notes.txt", "posterior-lambert+phong.parquet", "report.html"]
 
 
 def test_default_folder_is_numbered(run, tmp_path):
@@ -402,8 +402,8 @@ def test_default_run_prints_one_object_and_nothing_else(environment, tmp_path):
     assert all(f["posterior"]["verdict"] in ("reliable", "tentative") for f in found["fits"])
     assert sorted(os.listdir(tmp_path / "sparse-fitmat")) == [
         "fit.json",
-        "posterior-lambert+blinn-phong.nc",
-        "posterior-lambert+ggx.nc",
+        "posterior-lambert+blinn-phong.parquet",
+        "posterior-lambert+ggx.parquet",
         "report.html",
     ]
 

@@ -2,13 +2,14 @@
 
 import dataclasses
 import signal
+import sys
 
 import numpy as np
 import pytest
 
 import fitmat
 from fitmat.cli import session
-from fitmat.errors import ModelError
+from fitmat.errors import FitmatError, ModelError
 from fitmat.models.simulation import simulate
 from fitmat.reports import terminal
 from fitmat.studies.study import Study
@@ -86,6 +87,13 @@ def test_options_that_concern_no_model(posterior, chosen, sentence):
     measurements = posterior.fit.measurements
     with pytest.raises(ModelError, match=sentence):
         session.study(measurements, session.Plan({"lambert": {}}, sampling=False, **chosen))
+
+
+def test_a_missing_second_sampler_is_said_before_any_fit(posterior, monkeypatch):
+    monkeypatch.setitem(sys.modules, "blackjax", None)
+    monkeypatch.setattr(session, "_fitted", lambda *_: pytest.fail("a fit was started"))
+    with pytest.raises(FitmatError, match=r"blackjax, .* install it with pip install 'fitmat\[nuts\]'"):
+        session.study(posterior.fit.measurements, session.Plan({"lambert": {}}, second_opinion=True))
 
 
 def test_handler_is_restored_after_sampling(posterior, monkeypatch):

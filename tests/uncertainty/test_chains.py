@@ -1,13 +1,15 @@
 """Posteriors: emcee against importance sampling and Laplace, verdicts, interrupts, files, and coverage of the truth."""
 
 import dataclasses
+import json
+import sys
 from pathlib import Path
 from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+import polars as pl
 import pytest
-import xarray
 from scipy import stats
 
 import fitmat as fm
@@ -229,7 +231,57 @@ def test_thinning_spreads_over_the_run(sampled: Posterior) -> None:
     assert len(dataclasses.replace(sampled, values=sampled.values[:3]).thinned(10)[0]) == 3
 
 
+def test_draws_are_saved_as_a_table(fit: Fit, sampled: Posterior, tmp_path: Path) -> None:
+    for posterior in (sampled, fm.laplace(fit, seed=1)):
+        path = tmp_path / f"{posterior.method}.parquet"
+        posterior.save(path)
+        table, known = pl.read_parquet(path), pl.read_parquet_metadata(path)
+        assert table.columns == ["chain", "draw", *TRUTH, "discrepancy"]
+        numbers = table.sort("draw", "chain").select(*TRUTH, "discrepancy").to_numpy()
+        np.testing.assert_array_equal(numbers, np.column_stack([posterior.values, posterior.discrepancy]))
+        assert (known["model"], known["method"], known["verdict"]) == ("lambert+ggx", path.stem, posterior.verdict)
+        assert json.loads(known["units"]) == dict.fromkeys(TRUTH, "1")
+    assert (table["chain"].n_unique(), table["draw"].n_unique()) == (1, 2000)
+    assert "seed" not in known
+    diagnostics, table = sampled.diagnostics, sampled.table()
+    assert diagnostics is not None
+    assert (table["chain"].n_unique(), table["draw"].max()) == (
+        diagnostics.walkers,
+        diagnostics.steps - diagnostics.burn_in - 1,
+    )
+    assert (sampled.description()["seed"], sampled.description()["burn_in"]) == ("1", str(diagnostics.burn_in))
+
+
+def test_channels_have_their_own_columns(tmp_path: Path) -> None:
+    value = np.full((51, 3), [0.1, 0.2, 0.3])
+    m = fm.from_arrays(np.linspace(0, 1.2, 51), 0.3, value, sigma=0.01 * value, channels=("r", "g", "b"))
+    posterior = fm.laplace(fm.fit(m, "lambert"), seed=1)
+    posterior.save(tmp_path / "rgb.parquet")
+    table = pl.read_parquet(tmp_path / "rgb.parquet")
+    assert table.columns == ["chain", "draw", "kd r", "kd g", "kd b", "discrepancy"]
+    np.testing.assert_array_equal(table.select("^kd .*$").to_numpy(), posterior.values)
+
+
+def test_draws_are_saved_in_no_other_form(fit: Fit, tmp_path: Path) -> None:
+    with pytest.raises(FitmatError, match=r"draws\.csv: draws are written to \.parquet or \.nc; end the name with one"):
+        fm.laplace(fit, seed=1).save(tmp_path / "draws.csv")
+
+
+@pytest.mark.parametrize("missing", ["arviz_base", "h5netcdf"])
+def test_a_missing_arviz_is_said_with_its_remedy(
+    fit: Fit, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, missing: str
+) -> None:
+    monkeypatch.setitem(sys.modules, missing, None)
+    with pytest.raises(FitmatError, match=rf"needs the package {missing}, .* pip install 'fitmat\[netcdf\]'\.$"):
+        fm.laplace(fit, seed=1).save(tmp_path / "draws.nc")
+    assert not (tmp_path / "draws.nc").exists()
+
+
 def test_draws_are_saved_as_arviz_reads_them(fit: Fit, sampled: Posterior, tmp_path: Path) -> None:
+    for package in ("arviz_base", "h5netcdf"):
+        pytest.importorskip(package, reason="install it with pip install 'fitmat[netcdf]'")
+    import xarray
+
     for posterior in (sampled, fm.laplace(fit, seed=1)):
         path = tmp_path / f"{posterior.method}.nc"
         posterior.save(path)
@@ -251,9 +303,8 @@ def test_fixed_parameters_are_not_saved_but_stay_in_the_draws(tmp_path: Path) ->
     m = fm.from_arrays(np.linspace(0, 1.2, 51), 0.3, np.full(51, 0.1), sigma=np.full(51, 0.01))
     held = fm.laplace(fm.fit(m, "lambert", fixed={"kd": 0.3}), seed=1)
     assert set(held.values[:, 0]) == {0.3}
-    held.save(tmp_path / "held.nc")
-    with xarray.open_datatree(tmp_path / "held.nc", engine="h5netcdf") as tree:
-        assert set(tree.children["posterior"].data_vars) == {"discrepancy"}
+    assert held.table().columns == ["chain", "draw", "discrepancy"]
+    assert held.description()["units"] == "{}"
 
 
 def test_intervals_cover_the_truth() -> None:

@@ -1,6 +1,7 @@
 """The second sampler: against closed forms, beside emcee, and what it says where they differ."""
 
 import dataclasses
+import sys
 
 import numpy as np
 import pytest
@@ -84,6 +85,14 @@ def test_a_second_sampler_that_did_not_converge_has_no_say(inferred: SecondOpini
         assert opinion.verdict == "unsure"
         assert "no second opinion, the second sampler did not converge" in opinion.words
     assert compare_chains(posterior, other[:, :20]).verdict == "unsure"  # too few draws
+
+
+def test_a_missing_sampler_is_said_before_anything_is_sampled(
+    inferred: SecondOpinion, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "blackjax", None)
+    with pytest.raises(FitmatError, match=r"NUTS needs the package blackjax, .* pip install 'fitmat\[nuts\]'\.$"):
+        fm.check_posterior(dataclasses.replace(inferred.posterior, chain=None), seed=1)
 
 
 def test_without_a_chain_there_is_nothing_to_check(inferred: SecondOpinion) -> None:
