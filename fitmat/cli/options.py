@@ -122,7 +122,8 @@ Count = Annotated[int, typer.Option(min=1, max=50, help="How many measurements t
 Ior = Annotated[
     str | None,
     typer.Option(
-        help="Material whose refractive index is fixed from the literature: Au, N-BK7, PMMA, main/Cr/Rakic-BB.",
+        help="Material whose refractive index is fixed from the literature: Au, N-BK7, PMMA, or shelf/book/page of "
+        "refractiveindex.info, such as main/Cr/Rakic-BB (pip install 'fitmat[materials]').",
         metavar="NAME",
         show_default=False,
     ),

