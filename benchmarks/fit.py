@@ -18,12 +18,13 @@ import scipy.optimize
 from peer import Problem, from_sine
 
 import fitmat as fm
-from fitmat.fitting.fitting import Chart, descend
+from fitmat.fitting.coordinates import coordinates
+from fitmat.fitting.fitting import descend
 from fitmat.fitting.likelihood import Data, first_discrepancy, prepare
 from fitmat.maths.least_squares import Minimum
 from fitmat.measurements.noise import measured_noise
 from fitmat.measurements.samples import Measurements
-from fitmat.models.parameters import space, vector
+from fitmat.models.parameters import vector
 
 TRUTH = {"kd": 0.3, "ks": 1.0, "alpha": 0.2, "eta": 1.5}
 START = {"kd": 0.45, "ks": 0.7, "alpha": 0.28, "eta": 1.9}
@@ -52,12 +53,12 @@ def problem(m: Measurements, *, hoisted: bool) -> Problem:
 def ours(data: Data, s: jax.Array) -> tuple[Callable[[], Minimum], Callable[[Minimum], np.ndarray]]:
     """One warm fit, to call; and its parameters."""
     template = fm.model("lambert+ggx", channels=1, **START)
-    chart, values = Chart(template, (0, 1, 2, 3)), vector(template)
-    solve = jax.jit(lambda u, data, s: descend(chart, data, values, u, s))
-    start = chart.free(values)
+    moved, values = coordinates(template), vector(template)
+    solve = jax.jit(lambda u, data, s: descend((template, moved), data, values, u, s))
+    start = moved.unbounded(values)
     return (
         lambda: jax.block_until_ready(solve(start, data, s)),
-        lambda end: np.asarray(vector(chart.model(values, end.x))),
+        lambda end: np.asarray(moved.from_unbounded(values, end.x)),
     )
 
 
@@ -97,7 +98,7 @@ def race(rows: int, repeats: int, *, whole: bool) -> None:
     data = prepare(m, measured_noise(m))
     s = first_discrepancy(data)
     template = fm.model("lambert+ggx", channels=1, **START)
-    start = np.asarray(space(template).to_free(vector(template)))
+    start = np.asarray(coordinates(template).unbounded(vector(template)))
     one, values = ours(data, s)
     other, hoisted = (scipys(problem(m, hoisted=by_hand), float(s), start) for by_hand in (False, True))
     end, solution = one(), other()

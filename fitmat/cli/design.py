@@ -16,7 +16,6 @@ from fitmat.errors import OutputError
 from fitmat.files import write_bytes
 from fitmat.judgement.design.design import MATCH, Design, Proposal, next_angles
 from fitmat.match.match import is_microfacet
-from fitmat.models.parameters import space
 from fitmat.text import plain, text_table
 from fitmat.uncertainty.posterior import Posterior
 
@@ -101,8 +100,7 @@ def as_dict(found: Design) -> dict[str, Any]:
 
 
 def _deviations(found: Design, sd: np.ndarray) -> dict[str, dict[str, Any]]:
-    log = space(found.fit.model).log[found.fit.free]
-    kinds = zip(found.names, sd, log, strict=True)
+    kinds = zip(found.names, sd, found.fit.coordinates.log, strict=True)
     return {name: {"sd": float(s), "of": "ln" if ratio else "value"} for name, s, ratio in kinds}
 
 
@@ -149,7 +147,7 @@ def _known(found: Design, before: np.ndarray, after: np.ndarray) -> str:
     """sd before → after of the target, or of the parameter that gains most."""
     owned = [k for k, n in enumerate(found.names) if found.target in (n, n.rpartition(" ")[0])]
     k = max(owned or range(len(after)), key=lambda k: before[k] / after[k])
-    log = space(found.fit.model).log[found.fit.free][k]
+    log = found.fit.coordinates.log[k]
     return f"{found.names[k]} ± {_amount(before[k], log)} → ± {_amount(after[k], log)}"
 
 

@@ -14,6 +14,7 @@ import optimistix as optx
 from jaxtyping import Array, ArrayLike
 
 from fitmat.errors import FitmatError, ModelError
+from fitmat.fitting.coordinates import Coordinates, coordinates
 from fitmat.fitting.likelihood import (
     Data,
     best_discrepancy,
@@ -27,7 +28,7 @@ from fitmat.fitting.likelihood import (
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.losses import loss as find_loss
 from fitmat.fitting.priors import prepared
-from fitmat.fitting.result import Ends, Fit, conclude, free_places
+from fitmat.fitting.result import Ends, Fit, conclude
 from fitmat.fitting.starts import starting_points
 from fitmat.maths.least_squares import Minimum, Units, least_squares
 from fitmat.measurements.noise import measured_noise
@@ -35,7 +36,7 @@ from fitmat.measurements.samples import Measurements
 from fitmat.models.around.instrument import Seen
 from fitmat.models.around.noise import LEAST_ABSOLUTE, Noisy
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
-from fitmat.models.parameters import Space, check_range, entries, space, vector, with_vector
+from fitmat.models.parameters import check_range, entries, vector, with_vector
 from fitmat.models.registry import model
 
 STARTS = 6
@@ -101,8 +102,8 @@ def fit(
     if chosen.infers_noise:
         shown, known = Noisy(shown), _noise_priors(measurements) | known
     held = _held(shown, fixed or {})
-    free = free_places(shown, held)
-    needed = len(free) + 2
+    moved = coordinates(shown, held)
+    needed = moved.count + 2
     found_noise = measured_noise(measurements)
     if chosen.needs_noise and not found_noise.known:
         raise FitmatError(
@@ -113,14 +114,14 @@ def fit(
     usable = int(np.count_nonzero(data.weight))
     if usable < needed:
         raise FitmatError(
-            f"{measurements.source}: {usable} valid samples, but {template.name} has {len(free)} free "
+            f"{measurements.source}: {usable} valid samples, but {template.name} has {moved.count} free "
             f"parameters and needs at least {needed}; measure more angles or fix parameters (--fix ks=1)."
         )
     first = first_discrepancy(data)
     starts = starting_points(template, data, first, held, STARTS)
     added = np.asarray(vector(shown))[len(vector(template)) :]
     starts = np.column_stack([starts, np.tile(added, (len(starts), 1))])
-    ends = jax.device_get(refine(shown, data, jnp.asarray(starts), first, tuple(int(k) for k in free), max_steps))
+    ends = jax.device_get(refine(shown, data, jnp.asarray(starts), first, moved, max_steps))
     return conclude(measurements, shown, held, (found_noise, data), ends)
 
 
@@ -161,9 +162,7 @@ def _held(template: AbstractBRDF, fixed: Mapping[str, ArrayLike]) -> dict[str, n
 
 
 @eqx.filter_jit
-def refine(
-    template: AbstractBRDF, data: Data, starts: Array, first: Array, free: tuple[int, ...], max_steps: int
-) -> Ends:
+def refine(template: AbstractBRDF, data: Data, starts: Array, first: Array, moved: Coordinates, max_steps: int) -> Ends:
     """Alternate Levenberg–Marquardt over the parameters and the best discrepancy, from every start.
 
     In a location–scale family the two are information-orthogonal, so that a few rounds settle both.
@@ -173,16 +172,18 @@ def refine(
         data: The samples, with their loss and prior.
         starts: Physical parameter vectors, (k, p), which also hold what is fixed.
         first: A first guess of the discrepancy.
-        free: Places of the parameters that are fitted.
+        moved: The parameters that are fitted.
         max_steps: Levenberg–Marquardt iterations per start and round.
     """
-    chart = Chart(template, free)
+
+    def at(base: Array, u: Array) -> AbstractBRDF:
+        return with_vector(template, moved.from_unbounded(base, u))
 
     def settle(data: Data, base: Array, u: Array, s: Array) -> tuple[Array, ...]:
         def body(state: tuple) -> tuple:
             u, s, _, _, steps, rounds = state
-            end = descend(chart, data, base, u, s, max_steps=max_steps)
-            predicted = evaluate_pairs(chart.model(base, end.x), data.wi, data.wo) * data.kappa
+            end = descend((template, moved), data, base, u, s, max_steps=max_steps)
+            predicted = evaluate_pairs(at(base, end.x), data.wi, data.wo) * data.kappa
             updated = best_discrepancy(predicted, data, s)
             settled = jnp.abs(updated - s) <= SETTLED * s
             solved = (end.result == optx.RESULTS.successful) | (end.offset < STEADY)
@@ -193,54 +194,35 @@ def refine(
 
     def one(base: Array) -> Ends:
         begin = first if data.loss.infers_discrepancy else jnp.zeros(())
-        u, s, settled, solved, steps, _ = settle(data, base, chart.free(base), begin)
-        best = chart.model(base, u)
+        u, s, settled, solved, steps, _ = settle(data, base, moved.unbounded(base), begin)
+        best = at(base, u)
         return Ends(vector(best), s, log_density(best, data, s), settled & solved, steps)
 
     return mapped(one, starts)
 
 
-class Chart:
-    """The free coordinates of a model's fitted parameters.
+def descend(
+    what: tuple[AbstractBRDF, Coordinates], data: Data, base: Array, u: Array, s: Array, *, max_steps: int = 256
+) -> Minimum:
+    """Levenberg–Marquardt over unbounded coordinates with the discrepancy held; first on a part of many rows.
 
     Args:
-        template: Gives shapes, bounds and static choices.
-        free: Which entries of the parameter vector are fitted.
-    """
-
-    def __init__(self, template: AbstractBRDF, free: tuple[int, ...]) -> None:
-        places, whole = np.array(free, int), space(template)
-        self.template, self.places = template, places
-        self.coordinates = Space(whole.lower[places], whole.upper[places], whole.log[places])
-
-    def free(self, values: Array) -> Array:
-        """Physical parameter vector → free coordinates."""
-        return self.coordinates.to_free(values[self.places])
-
-    def model(self, values: Array, u: Array) -> AbstractBRDF:
-        """The model with the fitted parameters at u and the others as in `values`."""
-        return with_vector(self.template, values.at[self.places].set(self.coordinates.from_free(u)))
-
-
-def descend(chart: Chart, data: Data, values: Array, u: Array, s: Array, *, max_steps: int = 256) -> Minimum:
-    """Levenberg–Marquardt over the free coordinates with the discrepancy held; first on a part of many rows.
-
-    Args:
-        chart: The coordinates.
+        what: The model and which of its parameters are fitted.
         data: The samples.
-        values: Physical parameter vector that holds what is fixed, (p,).
-        u: Where to start, free coordinates.
+        base: Physical parameter vector that holds what is fixed, (p,).
+        u: Where to start, unbounded coordinates.
         s: Discrepancy.
         max_steps: Iterations allowed on all rows.
     """
+    template, moved = what
 
     def residual(u: Array, args: tuple[Data, Array, Array, Array]) -> Array:
-        data, values, s, measured = args
-        return every_residual(chart.model(values, u), data, s, measured)
+        data, base, s, measured = args
+        return every_residual(with_vector(template, moved.from_unbounded(base, u)), data, s, measured)
 
     def minimum(data: Data, u: Array, units: Units | None) -> Minimum:
         measured = transformed(data, s)
-        return least_squares(residual, u, (data, values, s, measured), max_steps=max_steps, units=units)
+        return least_squares(residual, u, (data, base, s, measured), max_steps=max_steps, units=units)
 
     rows = data.x.shape[0]
     if rows <= MANY_ROWS:

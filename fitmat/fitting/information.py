@@ -11,9 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from fitmat.fitting.coordinates import Coordinates, coordinates
 from fitmat.fitting.likelihood import Data, every_residual, noise_scale, residuals
 from fitmat.models.base import AbstractBRDF
-from fitmat.models.parameters import entries, space, vector, with_vector
+from fitmat.models.parameters import entries, vector
 
 UNDETERMINED = {"log": 1.0, "linear": 0.3}
 """A parameter whose standard deviation exceeds this (in ln p, or as a fraction of its range) is not determined."""
@@ -24,9 +25,8 @@ FOLLOWS, MISSES = 0.5, 2.0
 
 def _cost_terms(best: AbstractBRDF, data: Data, s: Array) -> tuple[Callable[[Array], Array], Array]:
     """The residuals as a function of the natural coordinates, and those of `best`."""
-    coordinates = space(best)
-    at = coordinates.natural(vector(best))
-    return lambda t: every_residual(with_vector(best, coordinates.physical(t)), data, s), at
+    every, values = coordinates(best), vector(best)
+    return lambda t: every_residual(every.model(best, values, t), data, s), every.natural(values)
 
 
 @eqx.filter_jit
@@ -92,30 +92,29 @@ def inverse_information(information: np.ndarray, span: np.ndarray) -> np.ndarray
 
 
 def covariance(
-    best: AbstractBRDF, information: np.ndarray, free: np.ndarray, told: np.ndarray
+    best: AbstractBRDF, information: np.ndarray, moved: Coordinates, told: np.ndarray
 ) -> tuple[Float[np.ndarray, "p p"], tuple[str, ...]]:
     """The covariance in physical parameters, and what is not determined.
 
-    What is determined is judged with every free parameter released, those on a bound as well: a fit that slid along a
+    What is determined is judged with every fitted parameter released, those on a bound as well: a fit that slid along a
     degenerate direction until it met a bound knows no more for that. Only where all are determined are the parameters
-    on a bound held there. Parameters of which a prior tells (`told`, as `free`) count as known in the judgement.
+    on a bound held there. Parameters of which a prior tells (`told`, one for each fitted) count as known in the
+    judgement.
     """
-    coordinates, values = space(best), np.asarray(vector(best))
-    span = coordinates.natural_upper - coordinates.natural_lower
-    released = inverse_information(information[np.ix_(free, free)], span[free])
-    limit = np.where(coordinates.log, UNDETERMINED["log"], UNDETERMINED["linear"] * span)
-    judged = free[~told]
-    apart = released if not told.any() else inverse_information(information[np.ix_(judged, judged)], span[judged])
-    loose = set(judged[~(np.sqrt(np.diagonal(apart)) <= limit[judged])])
-    on_bound = (coordinates.at_bound(values) != 0) & np.isin(np.arange(len(values)), free)
-    inside = free[~on_bound[free]]
+    values, free, span = np.asarray(vector(best)), moved.index, moved.span
+    known = information[np.ix_(free, free)]
+    released = inverse_information(known, span)
+    limit = np.where(moved.ratio, UNDETERMINED["log"], UNDETERMINED["linear"] * span)
+    apart = released if not told.any() else inverse_information(known[np.ix_(~told, ~told)], span[~told])
+    loose = set(free[~told][~(np.sqrt(np.diagonal(apart)) <= limit[~told])])
+    inside = moved.side(values) == 0
     if loose:
-        natural = released[np.ix_(~on_bound[free], ~on_bound[free])]
+        natural = released[np.ix_(inside, inside)]
     else:
-        natural = inverse_information(information[np.ix_(inside, inside)], span[inside])
-    slope = np.where(coordinates.log, values, 1.0)[inside]
+        natural = inverse_information(known[np.ix_(inside, inside)], span[inside])
+    slope = moved.slope(values)[inside]
     covariance = np.zeros((len(values), len(values)))
-    covariance[np.ix_(inside, inside)] = natural * np.outer(slope, slope)
-    covariance[on_bound, :] = covariance[:, on_bound] = np.nan
+    covariance[np.ix_(free[inside], free[inside])] = natural * np.outer(slope, slope)
+    covariance[free[~inside], :] = covariance[:, free[~inside]] = np.nan
     names = tuple(e.name for e in entries(best) if loose & set(range(e.place.start, e.place.stop)))
     return covariance, names

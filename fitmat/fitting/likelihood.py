@@ -18,13 +18,14 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat._types import Directions, Samples, Scalar
+from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.losses import DEFAULT, Loss
 from fitmat.fitting.stabilising import spread
 from fitmat.measurements.noise import Noise, levels
 from fitmat.measurements.samples import Measurements
 from fitmat.models.around.noise import Noisy
 from fitmat.models.base import AbstractBRDF, evaluate_pairs, padded_length
-from fitmat.models.parameters import space, vector
+from fitmat.models.parameters import vector
 
 
 class Prior(eqx.Module):
@@ -152,7 +153,7 @@ def prior_residuals(model: AbstractBRDF, data: Data) -> Float[Array, " p"]:
     """How many prior standard deviations each parameter is from its prior mean; (0,) where the prior is flat."""
     if data.prior is None:
         return jnp.zeros(0)
-    return data.prior.precision * (space(model).natural(vector(model)) - data.prior.mean)
+    return data.prior.precision * (coordinates(model).natural(vector(model)) - data.prior.mean)
 
 
 def every_residual(model: AbstractBRDF, data: Data, s: Scalar, measured: Samples | None = None) -> Float[Array, " r"]:

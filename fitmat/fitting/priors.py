@@ -15,10 +15,11 @@ from jaxtyping import ArrayLike, Float
 from scipy.stats import truncnorm
 
 from fitmat.errors import ModelError
+from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.likelihood import Prior
 from fitmat.measurements.instrument import Instrument
 from fitmat.models.base import AbstractBRDF
-from fitmat.models.parameters import Entry, entries, space, vector
+from fitmat.models.parameters import Entry, entries, vector
 from fitmat.text import with_error
 
 DISCREPANCY = "discrepancy"
@@ -38,7 +39,7 @@ def prepared(
     Raises:
         ModelError: a name is not a parameter's, a centre lies outside its bounds, an sd is not positive.
     """
-    coordinates, places = space(model), {e.name: e for e in entries(model)}
+    every, places = coordinates(model), {e.name: e for e in entries(model)}
     mean, precision = np.zeros(len(vector(model))), np.zeros(len(vector(model)))
     discrepancy = 0.0
     if instrument.calibration:
@@ -51,7 +52,7 @@ def prepared(
             raise ModelError(f"prior of {name!r}: {model.name} has {', '.join(places)}; also {DISCREPANCY}.")
         entry = places[name]
         middle, spread = _inside(entry, centre), _positive(name, sd)
-        log = coordinates.log[entry.place]
+        log = every.ratio[entry.place]
         mean[entry.place] = np.where(log, np.log(np.where(log, middle, 1.0)), middle)
         precision[entry.place] = np.where(log, middle, 1.0) / spread
     if not precision.any() and not discrepancy:
@@ -95,8 +96,7 @@ def assignments(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
 
 def natural_sd(model: AbstractBRDF, prior: Prior | None) -> Float[np.ndarray, " p"]:
     """Prior standard deviation of every natural coordinate; that of a flat prior is its range / √12."""
-    coordinates = space(model)
-    flat = (coordinates.natural_upper - coordinates.natural_lower) / np.sqrt(12.0)
+    flat = coordinates(model).span / np.sqrt(12.0)
     if prior is None:
         return flat
     precision = np.asarray(prior.precision)
@@ -113,28 +113,27 @@ def draw(
     """
     if prior is None or not float(prior.discrepancy) > 0:
         raise ModelError(f"cannot draw from a flat prior of {DISCREPANCY}: state one, for example (0, 0.01).")
-    coordinates = space(model)
-    low, high = coordinates.natural_lower, coordinates.natural_upper
+    every = coordinates(model)
+    low, high = every.low, every.high
     precision = np.asarray(prior.precision)
     sd = np.where(precision > 0, 1.0 / np.where(precision > 0, precision, 1.0), 1.0)
     a, b = (low - np.asarray(prior.mean)) / sd, (high - np.asarray(prior.mean)) / sd
     u = rng.random((count, len(low)))
     gaussian = np.asarray(prior.mean) + sd * truncnorm.ppf(u, a, b)
     natural = np.where(precision > 0, gaussian, low + u * (high - low))
-    physical = np.where(coordinates.log, np.exp(np.where(coordinates.log, natural, 0.0)), natural)
     values = np.tile(np.asarray(vector(model)), (count, 1))
-    values[:, free] = physical[:, free]
+    values[:, free] = every.physical(natural)[:, free]
     return values, np.abs(rng.standard_normal(count)) / float(prior.discrepancy)
 
 
 def words(model: AbstractBRDF, prior: Prior | None) -> dict[str, tuple[str, ...]]:
     """The prior of every parameter as text, one for each channel: "1.50 ± 0.05", or "0.0001 – 1, any magnitude"."""
-    coordinates, found = space(model), {}
+    found = {}
     for entry in entries(model):
         texts = []
         for k in range(entry.place.start, entry.place.stop):
             stated = prior is not None and float(prior.precision[k]) > 0
-            texts.append(_stated(prior, coordinates.log[k], k) if stated else _flat(entry))
+            texts.append(_stated(prior, entry.param.scale == "log", k) if stated else _flat(entry))
         found[entry.name] = tuple(texts)
     return found
 

@@ -4,22 +4,22 @@ Finds nothing itself; `fitting` does.
 """
 
 import dataclasses
+import functools
 import math
-from collections.abc import Mapping
-from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from fitmat.fitting.coordinates import Coordinates, coordinates
 from fitmat.fitting.information import FOLLOWS, MISSES, covariance, information
 from fitmat.fitting.likelihood import Data, best_discrepancy, first_discrepancy, noise_scale
 from fitmat.fitting.losses import DEFAULT, Loss
 from fitmat.measurements.noise import Noise
 from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
-from fitmat.models.parameters import Entry, entries, space, vector, with_vector
+from fitmat.models.parameters import Entry, entries, vector, with_vector
 from fitmat.text import html_table, text_table, with_error
 
 AGREE = 0.1
@@ -92,10 +92,23 @@ class Fit:
         """Best parameters, physical units."""
         return np.asarray(vector(self.model))
 
+    @functools.cached_property
+    def coordinates(self) -> Coordinates:
+        """Of the parameters that were fitted."""
+        return coordinates(self.model, self.held, self.measurements.channels)
+
     @property
     def free(self) -> np.ndarray:
         """Indices of the parameters that were fitted."""
-        return free_places(self.model, self.held)
+        return self.coordinates.index
+
+    @functools.cached_property
+    def on_bound(self) -> dict[str, str]:
+        """Names of fitted parameters that sit on a bound → "lower" or "upper"."""
+        sides = dict(zip(self.coordinates.places, self.coordinates.side(self.values).tolist(), strict=True))
+        found = {e.name: [sides.get(k, 0) for k in range(e.place.start, e.place.stop)] for e in self.entries}
+        first = {name: next((side for side in part if side), 0) for name, part in found.items()}
+        return {name: "lower" if side < 0 else "upper" for name, side in first.items() if side}
 
     @property
     def loss(self) -> Loss:
@@ -133,13 +146,10 @@ class Fit:
 
     def _rows(self) -> list[tuple[str, str, str]]:
         sd = np.sqrt(np.diagonal(self.covariance))
-        channels = self.measurements.channels
-        named = [
-            (f"{e.name} {channels[k]}" if e.shape and len(channels) > 1 else e.name, e.param.symbol, e.place.start + k)
-            for e in self.entries
-            for k in range(e.size)
-        ]
-        return [(name, symbol, with_error(float(self.values[at]), float(sd[at]))) for name, symbol, at in named]
+        names = coordinates(self.model, channels=self.measurements.channels).names
+        symbols = [e.param.symbol for e in self.entries for _ in range(e.size)]
+        rows = zip(names, symbols, self.values, sd, strict=True)
+        return [(name, symbol, with_error(float(value), float(error))) for name, symbol, value, error in rows]
 
     def __str__(self) -> str:
         """The outcome and every parameter with its standard deviation."""
@@ -169,13 +179,6 @@ class Fit:
         return self.n_inferred * np.log(self.n_values) - 2 * self.log_likelihood
 
 
-def free_places(template: AbstractBRDF, held: Mapping[str, Any]) -> np.ndarray:
-    """Indices into the parameter vector that are not held."""
-    return np.array(
-        [k for e in entries(template) if e.name not in held for k in range(e.place.start, e.place.stop)], int
-    )
-
-
 class Ends(eqx.Module):
     """Where k starts ended; every array begins with k."""
 
@@ -200,10 +203,10 @@ def conclude(
     k = int(np.argmax(scores))
     best = with_vector(template, jnp.asarray(ends.values[k]))
     s = float(ends.discrepancy[k])
-    free = free_places(template, held)
-    bounds = space(template).at_bound(np.asarray(ends.values[k]))
-    known = information(best, data, s, free)
-    spread, undetermined = covariance(best, known, free, data.told(free))
+    moved = coordinates(template, held)
+    on_bound = bool(moved.side(np.asarray(ends.values[k])).any())
+    known = information(best, data, s, moved.index)
+    spread, undetermined = covariance(best, known, moved, data.told(moved.index))
     return Fit(
         name=template.name,
         model=best,
@@ -212,7 +215,7 @@ def conclude(
         data=data,
         discrepancy=s,
         held=held,
-        result=named_outcome(bool(usable[k]), bool(ends.solved[k]), bool(bounds[free].any()), undetermined),
+        result=named_outcome(bool(usable[k]), bool(ends.solved[k]), on_bound, undetermined),
         steps=int(ends.steps[k]),
         n_starts=len(scores),
         n_starts_agreeing=int(np.count_nonzero(scores > scores[k] - AGREE)) if usable[k] else 0,

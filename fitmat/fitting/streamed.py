@@ -21,7 +21,7 @@ from fitmat.fitting.streamed_sums import Sums, block_sums, blocks, prior_sums
 from fitmat.measurements.large.noise import Scatter, scatter
 from fitmat.measurements.large.stream import Progress, Rows
 from fitmat.models.base import AbstractBRDF
-from fitmat.models.parameters import space, vector, with_vector
+from fitmat.models.parameters import vector, with_vector
 
 T = TypeVar("T")
 
@@ -122,8 +122,8 @@ class _Range:
     """
 
     def __init__(self, start: Fit) -> None:
-        self._start, self._space, self._free = start, space(start.model), start.free
-        lower, upper = self._space.natural_lower[self._free], self._space.natural_upper[self._free]
+        self._start, self._moved, self._free = start, start.coordinates, start.free
+        lower, upper = self._moved.low, self._moved.high
         typical = float(noise_scale(start.data))
         self.lower, self.upper = np.append(lower, 0.0), np.append(upper, np.inf)
         self.longest = np.append((upper - lower) / 4.0, max(typical, start.discrepancy))
@@ -132,16 +132,14 @@ class _Range:
     @property
     def begin(self) -> np.ndarray:
         """The optimum of the part; what is almost on a bound, on it."""
-        side = self._space.at_bound(self._start.values)[self._free]
-        natural = self._space.natural_array(self._start.values)[self._free]
+        side, natural = self._moved.side(self._start.values), self._moved.natural(self._start.values)
         natural = np.where(side < 0, self.lower[:-1], np.where(side > 0, self.upper[:-1], natural))
         return np.append(natural, self._start.discrepancy)
 
     def model(self, x: np.ndarray) -> AbstractBRDF:
         """The model at x."""
-        values = self._start.values.copy()
-        log, bounds = self._space.log[self._free], (self._space.lower[self._free], self._space.upper[self._free])
-        values[self._free] = np.clip(np.where(log, np.exp(np.where(log, x[:-1], 0.0)), x[:-1]), *bounds)
+        values = self._moved.filled(self._start.values, x[:-1])
+        values[self._free] = np.clip(values[self._free], self._moved.lower, self._moved.upper)
         return with_vector(self._start.model, jnp.asarray(values))
 
     def second_order(self, n_valid: int) -> Float[np.ndarray, "p p"]:
@@ -222,9 +220,8 @@ def _concluded(file: _File, around: _Range, top: _Top) -> Fit:
         observed = file.added(lambda data: np.asarray(observed_information(best, data, at)), "curvature")
         observed = observed + np.asarray(prior_sums(best, start.data, at).gram)
         information = observed if is_positive(observed[np.ix_(free, free)]) else information
-    spread, undetermined = covariance(best, information, free, start.data.told(free))
-    values = np.asarray(vector(best))
-    on_bound = bool(space(best).at_bound(values)[free].any())
+    spread, undetermined = covariance(best, information, start.coordinates, start.data.told(free))
+    on_bound = bool(start.coordinates.side(np.asarray(vector(best))).any())
     return dataclasses.replace(
         start,
         model=best,

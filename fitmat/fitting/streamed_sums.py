@@ -12,11 +12,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.likelihood import Data, discrepancy_cost, log_likelihood, prepare, prior_residuals, residuals
 from fitmat.measurements.noise import Noise
 from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF
-from fitmat.models.parameters import space, vector, with_vector
+from fitmat.models.parameters import vector
 
 BLOCK = 2**15
 """Rows for which the program that adds up one block is compiled; its intermediate arrays stay in the cache."""
@@ -45,12 +46,12 @@ class Sums(eqx.Module):
 @eqx.filter_jit
 def block_sums(best: AbstractBRDF, data: Data, s: Array) -> Sums:
     """The sums of one block at `best` and s."""
-    coordinates = space(best)
-    at = coordinates.natural(vector(best))
+    every, values = coordinates(best), vector(best)
+    at = every.natural(values)
 
     def by_parameter(s: Array) -> tuple[Array, Array]:
         def residual(t: Array) -> Array:
-            return residuals(with_vector(best, coordinates.physical(t)), data, s).ravel()
+            return residuals(every.model(best, values, t), data, s).ravel()
 
         r, columns = jax.vmap(lambda e: jax.jvp(residual, (at,), (e,)), out_axes=(None, 0))(jnp.eye(len(at)))
         return columns @ r, columns @ columns.T
@@ -66,11 +67,11 @@ def block_sums(best: AbstractBRDF, data: Data, s: Array) -> Sums:
 
 def prior_sums(best: AbstractBRDF, data: Data, s: Array) -> Sums:
     """The sums of what is known beforehand; all 0 where the prior is flat."""
-    coordinates = space(best)
-    at = coordinates.natural(vector(best))
+    every, values = coordinates(best), vector(best)
+    at = every.natural(values)
 
     def apart(t: Array) -> Array:
-        return prior_residuals(with_vector(best, coordinates.physical(t)), data)
+        return prior_residuals(every.model(best, values, t), data)
 
     r, jacobian = apart(at), jax.jacfwd(apart)(at)
     slope = jax.grad(discrepancy_cost, argnums=1)

@@ -18,10 +18,10 @@ from jaxtyping import Array, ArrayLike, Bool, Float, Int
 from scipy.stats import binomtest
 
 from fitmat.errors import FitmatError
+from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.fitting import fit
 from fitmat.fitting.likelihood import Data, log_likelihood, mapped
 from fitmat.fitting.priors import DISCREPANCY, draw, prepared
-from fitmat.fitting.result import free_places
 from fitmat.fitting.stabilising import from_stabilised, stabilised
 from fitmat.judgement.uniformity import p_values
 from fitmat.measurements.instrument import IDEAL
@@ -155,7 +155,7 @@ def calibrate(
     rng = np.random.default_rng(seed)
     template = _centre(model(name, channels=len(geometry.channels)), priors)
     sigma = np.hypot(noise[1], noise[0] * evaluate(template, geometry.wi, geometry.wo))
-    free, prior = free_places(template, {}), prepared(template, IDEAL, priors)
+    free, prior = coordinates(template).index, prepared(template, IDEAL, priors)
     values, s = draw(template, prior, free, simulations, rng)
     kappa, normal = geometry.wi[:, 2:3], rng.normal(size=(simulations, *sigma.shape))
     where = tuple(jnp.asarray(part) for part in (geometry.wi, geometry.wo, sigma * kappa, kappa))

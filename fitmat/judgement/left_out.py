@@ -95,11 +95,11 @@ def leave_incidences_out(fit: Fit) -> LeftOut | None:
 def _refitted(fit: Fit, weights: Float[np.ndarray, "k n c"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Parameters (k, p), s and convergence of the fits under other weights."""
     starts = jnp.asarray(np.tile(fit.values, (fit.n_starts, 1)))
-    first, free = first_discrepancy(fit.data), tuple(int(k) for k in fit.free)
+    first = first_discrepancy(fit.data)
     found = []
     for weight in weights:
         data = eqx.tree_at(lambda d: d.weight, fit.data, jnp.asarray(weight))
-        ends = jax.device_get(refine(fit.model, data, starts, first, free, MAX_STEPS))
+        ends = jax.device_get(refine(fit.model, data, starts, first, fit.coordinates, MAX_STEPS))
         best = int(np.argmax(np.nan_to_num(ends.log_likelihood, nan=-np.inf)))
         found.append((ends.values[best], ends.discrepancy[best], ends.solved[best]))
     values, s, settled = (np.array(column) for column in zip(*found, strict=True))

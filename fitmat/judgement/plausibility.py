@@ -10,7 +10,6 @@ from fitmat.fitting.result import Fit
 from fitmat.models.albedo import directional_albedo
 from fitmat.models.around.instrument import surface
 from fitmat.models.base import AbstractBRDF, evaluate
-from fitmat.models.parameters import space
 
 ANGLES = np.deg2rad([0.0, 30.0, 60.0, 75.0, 85.0])
 """Incidence angles of the albedo, radians."""
@@ -60,13 +59,10 @@ def _reciprocal(model: AbstractBRDF) -> bool:
 
 def doubts(fit: Fit) -> tuple[str, ...]:
     """Parameters not determined or on a bound, and a fit that did not end, in words."""
-    side, found = space(fit.model).at_bound(fit.values), []
+    found = []
     if fit.undetermined:
         found.append(f"{' and '.join(fit.undetermined)} not determined")
-    for entry in fit.entries:
-        part = side[entry.place]
-        if part.any() and entry.name not in fit.held and entry.name not in fit.undetermined:
-            found.append(f"{entry.name} at its {'lower' if part[part != 0][0] < 0 else 'upper'} bound")
+    found += [f"{name} at its {side} bound" for name, side in fit.on_bound.items() if name not in fit.undetermined]
     if fit.result == "max_steps":
         found.append("the fit ran out of steps")
     return tuple(found)

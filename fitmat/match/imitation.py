@@ -15,9 +15,10 @@ import optimistix as optx
 from jaxtyping import Array, ArrayLike, Float
 
 from fitmat.errors import FitmatError
-from fitmat.fitting.fitting import STEADY, Chart
+from fitmat.fitting.coordinates import Coordinates, coordinates
+from fitmat.fitting.fitting import STEADY
 from fitmat.fitting.likelihood import mapped
-from fitmat.fitting.result import Fit, free_places
+from fitmat.fitting.result import Fit
 from fitmat.fitting.starts import nonnegative
 from fitmat.match.distances import AZIMUTHS, METRICS, direction_weight, incidence_weight
 from fitmat.match.regions import incidence_panels
@@ -26,7 +27,7 @@ from fitmat.maths.quadrature import Rule, lobe_rule
 from fitmat.models.around.instrument import surface
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.conversion import exponent_from_alpha
-from fitmat.models.parameters import check_range, entries, space, vector, with_vector
+from fitmat.models.parameters import check_range, entries, vector, with_vector
 from fitmat.models.registry import model
 
 LEAST_SQUARES = tuple(name for name, metric in METRICS.items() if metric.kind != "light")
@@ -104,10 +105,10 @@ def imitate(
     if metric not in LEAST_SQUARES:
         raise FitmatError(f"metric {metric!r}: expected one of {', '.join(LEAST_SQUARES)}.")
     source = surface(what.model if isinstance(what, Fit) else what)
-    template, free = _template(source, into, dict(fixed or {}))
-    nodes = _nodes(template, free, float(source.width()))
+    template, moved = _template(source, into, dict(fixed or {}))
+    nodes = _nodes(template, moved.index, float(source.width()))
     index = jnp.asarray(LEAST_SQUARES.index(metric))
-    found = _solve(source, template, jnp.asarray(nodes), index, tuple(int(k) for k in free))
+    found = _solve(source, template, jnp.asarray(nodes), index, moved)
     values, square, converged = (np.asarray(part) for part in found)
     best = int(np.argmin(np.nan_to_num(square, nan=np.inf)))
     mean_square = METRICS[metric].kind == "mean square"
@@ -118,8 +119,8 @@ def imitate(
 
 def _template(
     source: AbstractBRDF, into: str | AbstractBRDF, held: dict[str, ArrayLike]
-) -> tuple[AbstractBRDF, np.ndarray]:
-    """The imitating model with what is held at its value, and the places of what is free."""
+) -> tuple[AbstractBRDF, Coordinates]:
+    """The imitating model with what is held at its value, and the coordinates of the rest."""
     up = jnp.array([0.0, 0.0, 1.0])
     channels = jax.eval_shape(lambda: jnp.atleast_1d(source(up, up))).size
     template = surface(model(into, channels=channels) if isinstance(into, str) else into)
@@ -130,7 +131,7 @@ def _template(
         values[places[name]] = value
     template = with_vector(template, jnp.asarray(values))
     check_range(template)
-    return template, free_places(template, held)
+    return template, coordinates(template, held)
 
 
 def _nodes(template: AbstractBRDF, free: np.ndarray, width: float) -> Float[np.ndarray, "k p"]:
@@ -154,15 +155,16 @@ def _nodes(template: AbstractBRDF, free: np.ndarray, width: float) -> Float[np.n
 
 @eqx.filter_jit
 def _solve(
-    source: AbstractBRDF, template: AbstractBRDF, nodes: Float[Array, "k p"], metric: Array, free: tuple[int, ...]
+    source: AbstractBRDF, template: AbstractBRDF, nodes: Float[Array, "k p"], metric: Array, moved: Coordinates
 ) -> tuple[Float[Array, "e p"], Float[Array, " e"], Array]:
     """The ends of the best starts: parameters, T/V, and whether the solver was content; `metric` is traced."""
     rows = _rows(source, metric)
-    weights = [k for e in entries(template) if e.param.weight for k in range(e.place.start, e.place.stop) if k in free]
-    chart = Chart(template, free)
+    weights = [
+        k for e in entries(template) if e.param.weight for k in range(e.place.start, e.place.stop) if k in moved.places
+    ]
 
     def residual(u: Array, base: Array) -> Array:
-        return rows.residual(chart.model(base, u))
+        return rows.residual(with_vector(template, moved.from_unbounded(base, u)))
 
     def started(node: Array) -> tuple[Array, Array]:
         start = _weighted(template, node, jnp.array(weights, int), rows) if weights else node
@@ -172,8 +174,8 @@ def _solve(
     first = starts[jnp.argsort(cost)[:REFINED]]
 
     def refined(base: Array) -> tuple[Array, Array, Array]:
-        end = least_squares(residual, chart.free(base), base)
-        best = chart.model(base, end.x)
+        end = least_squares(residual, moved.unbounded(base), base)
+        best = with_vector(template, moved.from_unbounded(base, end.x))
         solved = (end.result == optx.RESULTS.successful) | (end.offset < STEADY)
         return vector(best), jnp.sum(rows.residual(best) ** 2), solved
 
@@ -244,5 +246,5 @@ def _weighted(template: AbstractBRDF, node: Array, places: Array, rows: Rows) ->
     offset, scale = value(dark), rows.root * rows.slope
     columns = jax.lax.map(lambda k: ((value(dark.at[k].set(1.0)) - offset) * scale).ravel(), places)
     target = ((rows.value - offset) * scale).ravel()
-    limit = jnp.asarray(space(template).upper)[places]
+    limit = jnp.asarray(coordinates(template).upper)[places]
     return dark.at[places].set(jnp.minimum(nonnegative(columns @ columns.T, columns @ target), limit))

@@ -14,8 +14,8 @@ from fitmat.files import write_bytes
 from fitmat.measurements.samples import Measurements
 
 FORMATS = {".csv": "csv", ".parquet": "parquet", ".binary": "merl", ".bsdf": "zemax", ".alta": "alta"}
-"""Suffix → room of `formats/` with `dump(measurements)`, its content as text or bytes, and, where the format cannot hold
-all, `losses(measurements)`, what it leaves out in sentences."""
+"""Suffix → room of `formats/` with `dump(measurements)`, its content as text or bytes, and, where that cannot hold all,
+`losses(measurements)`, what it leaves out in sentences."""
 
 
 def write(measurements: Measurements, path: str | os.PathLike[str], force: bool = False) -> Path:

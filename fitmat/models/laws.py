@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from fitmat.models.albedo import directional_albedo
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
-from fitmat.models.parameters import Entry, entries, space, vector, with_vector
+from fitmat.models.parameters import Entry, bounds, entries, vector, with_vector
 from fitmat.models.registry import LOBES, OVER
 from fitmat.models.terms.fresnel import AbstractFresnel, White
 
@@ -188,10 +188,10 @@ def unbounded(template: AbstractBRDF) -> int:
     Slopes in all parameters and both directions; corners are all parameters at a lower or upper bound, and each
     alone at either with the rest as given.
     """
-    bounds, given = space(template), np.asarray(vector(template))
-    rows = [bounds.lower, bounds.upper]
+    ends, given = bounds(template), np.asarray(vector(template))
+    rows = list(ends)
     for k in range(len(given)):
-        rows += [np.where(np.arange(len(given)) == k, bound, given) for bound in (bounds.lower, bounds.upper)]
+        rows += [np.where(np.arange(len(given)) == k, bound, given) for bound in ends]
     wi, wo = (jnp.asarray(np.array(column)) for column in zip(*singular().values(), strict=True))
     return int(_not_finite(template, jnp.asarray(np.array(rows)), wi, wo))
 

@@ -1,4 +1,4 @@
-"""Parameters of a model: bounds, unit, symbol and scale in one place, and the change of variables that keeps them.
+"""Parameters of a model: bounds, unit, symbol and scale in one place, and the model's values as one vector.
 
 This room knows nothing of reflection and fits nothing.
 """
@@ -16,12 +16,6 @@ from jaxtyping import Array, Float
 from fitmat.errors import ModelError
 
 M = TypeVar("M", bound=eqx.Module)
-
-EDGE = 1e-3
-"""Starts are kept this fraction of the free range (in sine coordinates) away from a bound."""
-
-AT_BOUND = 1e-6
-"""A coordinate closer to its bound than this fraction of its range counts as at the bound."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -139,64 +133,11 @@ def with_vector(model: M, values: Float[Array, " p"]) -> M:
     return ravel_pytree(model)[1](values)
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Space:
-    """Coordinates of a parameter vector: physical ↔ natural (log where the scale is log) ↔ free (unbounded).
-
-    The free coordinate is MINUIT's sine, x = lower + (upper − lower)(1 + sin u)/2 (James & Roos 1975), in the
-    natural coordinate: unlike a sigmoid it reaches a bound at finite u, so that a solver can stop there.
-    """
-
-    lower: Float[np.ndarray, " p"]
-    upper: Float[np.ndarray, " p"]
-    log: np.ndarray
-
-    def natural(self, values: Array) -> Array:
-        """Physical → natural: the logarithm where the scale is log."""
-        return jnp.where(self.log, jnp.log(jnp.where(self.log, values, 1.0)), values)
-
-    def physical(self, natural: Array) -> Array:
-        """Natural → physical."""
-        return jnp.where(self.log, jnp.exp(jnp.where(self.log, natural, 0.0)), natural)
-
-    def natural_array(self, values: np.ndarray) -> np.ndarray:
-        """`natural` for NumPy arrays, which need no compiled program."""
-        return np.where(self.log, np.log(np.where(self.log, values, 1.0)), values)
-
-    @property
-    def natural_lower(self) -> np.ndarray:
-        """Lower bounds, natural."""
-        return self.natural_array(self.lower)
-
-    @property
-    def natural_upper(self) -> np.ndarray:
-        """Upper bounds, natural."""
-        return self.natural_array(self.upper)
-
-    def to_free(self, values: Array) -> Array:
-        """Physical → free; values on or outside a bound are nudged inside."""
-        span = self.natural_upper - self.natural_lower
-        t = 2.0 * (self.natural(values) - self.natural_lower) / span - 1.0
-        return jnp.arcsin(jnp.clip(t, -np.cos(EDGE), np.cos(EDGE)))
-
-    def from_free(self, free: Array) -> Array:
-        """Free → physical, always within the bounds."""
-        span = self.natural_upper - self.natural_lower
-        return self.physical(jnp.asarray(self.natural_lower) + span * (1.0 + jnp.sin(free)) / 2.0)
-
-    def at_bound(self, values: np.ndarray) -> np.ndarray:
-        """Which physical values sit on a bound: −1 lower, +1 upper, 0 inside."""
-        span = self.natural_upper - self.natural_lower
-        t = (self.natural_array(values) - self.natural_lower) / span
-        return np.where(t < AT_BOUND, -1, np.where(t > 1.0 - AT_BOUND, 1, 0))
-
-
-def space(model: eqx.Module) -> Space:
-    """The coordinates of the model's parameter vector."""
-    every = entries(model)
-    spread = [(e.param.lower, e.param.upper, e.param.scale == "log") for e in every for _ in range(e.size)]
-    lower, upper, log = (np.array(column) for column in zip(*spread, strict=True))
-    return Space(lower, upper, log)
+def bounds(model: eqx.Module) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
+    """Lower and upper bounds of the model's parameter vector, physical units."""
+    ends = [(e.param.lower, e.param.upper) for e in entries(model) for _ in range(e.size)]
+    lower, upper = np.array(ends, float).reshape(-1, 2).T
+    return lower, upper
 
 
 def assignments(texts: Sequence[str], option: str) -> dict[str, np.ndarray]:

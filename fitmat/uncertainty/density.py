@@ -1,7 +1,7 @@
 """The posterior density over the coordinates that are sampled, and the way back to physical parameters.
 
-Sampled are the free natural coordinates (`apparent` weights) and, last, the discrepancy s, which is inert under a loss
-that infers none. The priors are those of `priors`. Nothing is drawn here.
+Sampled are the natural coordinates that were fitted (see `scaled_weights`) and, last, the discrepancy s, which is inert
+under a loss that infers none. The priors are those of `priors`. Nothing is drawn here.
 """
 
 from collections.abc import Callable
@@ -12,11 +12,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
+from fitmat.fitting.coordinates import Coordinates
 from fitmat.fitting.likelihood import Data, log_density, mapped, noise_scale
 from fitmat.fitting.result import Fit
 from fitmat.models.base import AbstractBRDF
-from fitmat.models.parameters import space, vector, with_vector
-from fitmat.uncertainty.scaled_weights import Apparent, apparent
+from fitmat.models.parameters import vector
+from fitmat.uncertainty.scaled_weights import sampled
 
 
 def default_walkers(fit: Fit) -> int:
@@ -31,51 +32,45 @@ def log_posterior(fit: Fit, batch: int = 1) -> Callable[[np.ndarray], np.ndarray
         fit: What is sampled.
         batch: Smaller w are filled up to this many, so that one program serves whole and half ensembles.
     """
-    free = tuple(int(k) for k in fit.free)
     arrays, static = eqx.partition((fit.model, fit.data), eqx.is_array)
-
-    where = apparent(fit)
+    moved = sampled(fit)
 
     def call(coordinates: np.ndarray) -> np.ndarray:
         filled = np.pad(coordinates, ((0, max(0, batch - len(coordinates))), (0, 0)), mode="edge")
-        return np.asarray(_log_posterior(arrays, static, free, where, jnp.asarray(filled)))[: len(coordinates)]
+        return np.asarray(_log_posterior(arrays, static, moved, jnp.asarray(filled)))[: len(coordinates)]
 
     return call
 
 
 @eqx.filter_jit
-def _log_posterior(arrays: Any, static: Any, free: tuple[int, ...], where: Apparent, coordinates: Array) -> Array:
+def _log_posterior(arrays: Any, static: Any, moved: Coordinates, coordinates: Array) -> Array:
     template, data = eqx.combine(arrays, static)
-    return mapped(lambda x: log_density_at(template, data, free, where, x), coordinates)
+    return mapped(lambda x: log_density_at(template, data, moved, x), coordinates)
 
 
-def log_density_at(template: AbstractBRDF, data: Data, free: tuple[int, ...], where: Apparent, x: Array) -> Array:
+def log_density_at(template: AbstractBRDF, data: Data, moved: Coordinates, x: Array) -> Array:
     """The log posterior density at one point of the sampled coordinates, traceable by JAX; −inf outside.
 
     Args:
         template: The fit's model, which holds what is fixed.
         data: The samples.
-        free: Places of the free parameters in the model's vector.
-        where: Which of the coordinates are apparent weights.
+        moved: What is sampled, from `scaled_weights.sampled`.
         x: The point, (free + 1,), s last.
     """
-    whole, places = space(template), np.array(free, int)
-    natural = where.natural(x)
+    natural = moved.unscaled(x)
     t, s = natural[:-1], natural[-1]
-    inside = jnp.all((t >= whole.natural_lower[places]) & (t <= whole.natural_upper[places])) & (s >= 0.0)
-    full = whole.natural(vector(template)).at[places].set(jnp.where(inside, t, whole.natural_lower[places]))
+    inside = jnp.all((t >= moved.low) & (t <= moved.high)) & (s >= 0.0)
+    here = moved.model(template, vector(template), jnp.where(inside, t, moved.low))
     inert = jnp.zeros(()) if data.loss.infers_discrepancy else 0.5 * (s / noise_scale(data)) ** 2
-    value = log_density(with_vector(template, whole.physical(full)), data, _inferred(data, jnp.abs(s))) - inert
+    value = log_density(here, data, _inferred(data, jnp.abs(s))) - inert
     return jnp.where(inside & jnp.isfinite(value), value, -jnp.inf)
 
 
 def physical(fit: Fit, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sampled coordinates (m, free + 1) to full physical vectors (m, p) and discrepancies (m,)."""
-    whole, natural = space(fit.model), apparent(fit).natural_array(coordinates)
-    full = np.tile(fit.values, (len(natural), 1))
-    log = whole.log[fit.free]
-    full[:, fit.free] = np.where(log, np.exp(np.where(log, natural[:, :-1], 0.0)), natural[:, :-1])
-    return full, _inferred(fit.data, natural[:, -1])
+    moved = sampled(fit)
+    natural = moved.unscaled(coordinates)
+    return moved.filled(fit.values, natural[:, :-1]), _inferred(fit.data, natural[:, -1])
 
 
 def _inferred(data: Data, s: Any) -> Any:

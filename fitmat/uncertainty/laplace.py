@@ -13,14 +13,14 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.fitting import fitting
+from fitmat.fitting.coordinates import Coordinates
 from fitmat.fitting.information import inverse_information
 from fitmat.fitting.likelihood import noise_scale
 from fitmat.fitting.result import Fit
 from fitmat.measurements.samples import Measurements
-from fitmat.models.parameters import space
 from fitmat.uncertainty.density import default_walkers, log_posterior, physical
 from fitmat.uncertainty.posterior import GOOD_PARETO, Posterior
-from fitmat.uncertainty.scaled_weights import Apparent, apparent
+from fitmat.uncertainty.scaled_weights import sampled, scaled_gaussian
 
 LAPLACE_DRAWS = 2000
 
@@ -91,26 +91,25 @@ def laplace_each(
 
 
 def gaussian(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and covariance of the sampled coordinates: the free natural ones, `apparent` weights, and s."""
-    whole, free = space(fit.model), fit.free
-    span = (whole.natural_upper - whole.natural_lower)[free]
-    centre = np.append(whole.natural_array(fit.values)[free], fit.discrepancy)
+    """Mean and covariance of the sampled coordinates: the natural ones, weights scaled, and s."""
+    moved, free = sampled(fit), fit.free
+    span, centre = moved.span, np.append(moved.natural(fit.values), fit.discrepancy)
     covariance = np.zeros((len(centre),) * 2)
     # The flat prior counts with the variance of its range: a direction that no datum determines is no wider than it.
     information = fit.information[np.ix_(free, free)] + np.diag(12.0 / span**2)
     covariance[:-1, :-1] = inverse_information(information, span)
     covariance[-1, -1] = _discrepancy_sd(fit) ** 2
-    return apparent(fit).gaussian(centre, covariance)
+    return scaled_gaussian(moved, centre, covariance)
 
 
 def draws(fit: Fit, count: int, rng: np.random.Generator) -> Float[np.ndarray, "count d"]:
     """Gaussian draws of the sampled coordinates, folded at the bounds of the parameters."""
-    whole, free, where = space(fit.model), fit.free, apparent(fit)
-    low, high = whole.natural_lower[free], whole.natural_upper[free]
-    natural = where.natural_array(rng.multivariate_normal(*gaussian(fit), size=count, method="eigh"))
+    moved = sampled(fit)
+    low, high = moved.low, moved.high
+    natural = moved.unscaled(rng.multivariate_normal(*gaussian(fit), size=count, method="eigh"))
     turn = (natural[:, :-1] - low) % (2 * (high - low))
     folded = low + np.where(turn > high - low, 2 * (high - low) - turn, turn)
-    return where.sampled(np.column_stack([folded, np.abs(natural[:, -1])]))
+    return moved.scaled(np.column_stack([folded, np.abs(natural[:, -1])]))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -121,17 +120,13 @@ class HeavyTailed:
         centre: Of the sampled coordinates, (d,).
         factor: Cholesky factor of the Gaussian's covariance, (d, d).
         whitening: Its inverse.
-        lower: Lower bounds of the natural coordinates, without s, (d − 1,).
-        upper: Upper bounds, (d − 1,).
-        where: Which coordinates are apparent weights.
+        moved: The coordinates without s, with their bounds.
     """
 
     centre: np.ndarray
     factor: np.ndarray
     whitening: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    where: Apparent
+    moved: Coordinates
 
     def drawn(self, count: int, random: np.random.Generator | np.random.RandomState) -> Float[np.ndarray, "count d"]:
         """Draws of the sampled coordinates; the bounds of the parameters do not hold them."""
@@ -146,8 +141,8 @@ class HeavyTailed:
         Leaving out what is outside changes the density by one factor for all, which no weight notices.
         """
         x = self.drawn(16 * count, rng)
-        natural = self.where.natural_array(x)[:, :-1]
-        return x[((natural >= self.lower) & (natural <= self.upper)).all(axis=1)][:count]
+        natural = self.moved.unscaled(x)[:, :-1]
+        return x[((natural >= self.moved.low) & (natural <= self.moved.high)).all(axis=1)][:count]
 
     def log_density(self, x: Float[np.ndarray, "m d"]) -> Float[np.ndarray, " m"]:
         """The log density at s ≥ 0, up to a constant: both sides of the fold."""
@@ -163,9 +158,7 @@ def heavy_tailed(fit: Fit) -> HeavyTailed:
     """The t distribution around a fit that is finite."""
     centre, covariance = gaussian(fit)
     factor = np.linalg.cholesky(covariance + 1e-12 * np.diag(np.diagonal(covariance)))
-    whole, free = space(fit.model), fit.free
-    whitening = np.linalg.inv(factor)
-    return HeavyTailed(centre, factor, whitening, whole.natural_lower[free], whole.natural_upper[free], apparent(fit))
+    return HeavyTailed(centre, factor, np.linalg.inv(factor), sampled(fit))
 
 
 def independent_proposal(fit: Fit) -> Callable[[np.ndarray, Any], tuple[np.ndarray, np.ndarray]]:
@@ -219,8 +212,9 @@ def _discrepancy_sd(fit: Fit) -> float:
     unit = max(float(noise_scale(fit.data)), 1e-12)
     moves = np.sort(np.concatenate([unit * 2.0 ** np.arange(-12, 12), fit.discrepancy * 2.0 ** np.arange(-6, 2)]))
     moves = moves[moves > 0]
-    natural = space(fit.model).natural_array(fit.values)[fit.free]
-    along = apparent(fit).sampled(np.vstack([np.append(natural, fit.discrepancy + move) for move in (0.0, *moves)]))
+    moved = sampled(fit)
+    natural = moved.natural(fit.values)
+    along = moved.scaled(np.vstack([np.append(natural, fit.discrepancy + move) for move in (0.0, *moves)]))
     density = log_posterior(fit, default_walkers(fit))(along)
     drop = density[0] - density[1:]
     crossing = np.flatnonzero(drop > 2.0)

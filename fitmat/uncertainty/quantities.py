@@ -4,11 +4,12 @@ Takes all numbers from a posterior; formats nothing.
 """
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
+from fitmat.fitting.coordinates import coordinates
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
-from fitmat.models.parameters import space
 from fitmat.models.terms.fresnel import eta_from_f0, f0_from_eta
 from fitmat.uncertainty.posterior import Posterior
 
@@ -54,17 +55,17 @@ def parameters(posterior: Posterior) -> list[Quantity]:
     if not fit.loss.posterior:
         sd = np.full_like(sd, np.nan)
     ci95 = posterior.interval() if sampled else _laplace_interval(posterior, sd)
-    bound = space(fit.model).at_bound(fit.values)
+    every = coordinates(fit.model)
+    sure = np.where(every.side(fit.values) != 0, np.nan, sd)
     result = []
     for entry in fit.entries:
-        side, held = bound[entry.place], entry.name in fit.held
+        held, p = entry.name in fit.held, entry.param
         remark = "fixed" if held else ""
         if entry.name in fit.undetermined:
             remark = "not determined by these angles"
-        elif side.any() and not held:
-            remark = f"at its {'lower' if side[side != 0][0] < 0 else 'upper'} bound"
-        given = np.where((side != 0) | held, np.nan, sd[entry.place])
-        p = entry.param
+        elif entry.name in fit.on_bound:
+            remark = f"at its {fit.on_bound[entry.name]} bound"
+        given = np.full(entry.size, np.nan) if held else sure[entry.place]
         result.append(
             Quantity(
                 *(entry.name, p.symbol, p.unit, p.doc, fit.values[entry.place], given, ci95[entry.place]),
@@ -88,17 +89,16 @@ def _discrepancy(posterior: Posterior) -> Quantity:
 
 
 def _laplace_interval(posterior: Posterior, sd: np.ndarray) -> np.ndarray:
-    fit, coordinates = posterior.fit, space(posterior.fit.model)
-    v = fit.values
+    every, v = coordinates(posterior.fit.model), posterior.fit.values
     with np.errstate(over="ignore"):
-        ratio = np.exp(Z95 * sd / np.where(coordinates.log, v, 1.0))
-        low = np.where(coordinates.log, v / ratio, v - Z95 * sd)
-        high = np.where(coordinates.log, v * ratio, v + Z95 * sd)
-    return np.stack([np.maximum(low, coordinates.lower), np.minimum(high, coordinates.upper)], axis=1)
+        ratio = np.exp(Z95 * sd / every.slope(v))
+        low = np.where(every.ratio, v / ratio, v - Z95 * sd)
+        high = np.where(every.ratio, v * ratio, v + Z95 * sd)
+    return np.stack([np.maximum(low, every.lower), np.minimum(high, every.upper)], axis=1)
 
 
-def derived(posterior: Posterior) -> list[Quantity]:
-    """What follows from the parameters, with intervals from the draws.
+def derived(posterior: Posterior, fitted: Sequence[Quantity]) -> list[Quantity]:
+    """What follows from the parameters, with intervals from the draws; `fitted` are the `parameters`.
 
     f0 and eta from each other (or f0 from η + iκ); the exponent 2/α² − 2 of the Blinn lobe as wide as a microfacet
     lobe and the alpha √(2/(n+2)) of a Phong lobe; the artists' roughness √α.
@@ -130,12 +130,14 @@ def derived(posterior: Posterior) -> list[Quantity]:
     if "exponent" in names:
         width = alpha_from_exponent(of("exponent"))
         found.append(("alpha", "α", "slope of the microfacet lobe as wide, √(2/(n+2))", width, "exponent"))
-    return [_from_draws(item, posterior) for item in found]
+    return [_from_draws(item, posterior, fitted) for item in found]
 
 
-def _from_draws(item: tuple[str, str, str, np.ndarray, str], posterior: Posterior) -> Quantity:
+def _from_draws(
+    item: tuple[str, str, str, np.ndarray, str], posterior: Posterior, fitted: Sequence[Quantity]
+) -> Quantity:
     name, symbol, doc, draws, source = item
-    origin = next(q for q in parameters(posterior) if q.name == source)
+    origin = next(q for q in fitted if q.name == source)
     ci95 = np.quantile(draws[1:], [0.025, 0.975], axis=0).T
     if not posterior.fit.loss.posterior:
         ci95 = np.full_like(ci95, np.nan)

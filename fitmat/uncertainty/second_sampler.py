@@ -16,14 +16,14 @@ from jaxtyping import Array, Float
 
 from fitmat.errors import FitmatError
 from fitmat.extras import needed
+from fitmat.fitting.coordinates import Coordinates
 from fitmat.fitting.likelihood import mapped
 from fitmat.fitting.result import Fit
-from fitmat.models.parameters import space
 from fitmat.text import html_table, text_table
 from fitmat.uncertainty.density import log_density_at, physical
 from fitmat.uncertainty.laplace import draws
 from fitmat.uncertainty.posterior import ENOUGH_ESS, GOOD_RHAT, Posterior
-from fitmat.uncertainty.scaled_weights import Apparent, apparent
+from fitmat.uncertainty.scaled_weights import sampled
 
 AGREEING = 4.0
 """Monte Carlo standard errors by which two numbers may differ by chance: 1 in 16,000 for a Gaussian."""
@@ -213,60 +213,49 @@ def _summary(chains: Float[np.ndarray, "chains draws"]) -> tuple[np.ndarray, np.
 
 def _names(fit: Fit) -> list[str]:
     """Of the free parameters, with their channels, then of s where it is inferred."""
-    channels = fit.measurements.channels
-    free = [e for e in fit.entries if e.name not in fit.held]
-    several = len(channels) > 1
-    named = [f"{e.name} {channels[k]}" if e.shape and several else e.name for e in free for k in range(e.size)]
-    return [*named, "discrepancy"] if fit.loss.infers_discrepancy else named
+    return [*fit.coordinates.names, *(["discrepancy"] if fit.loss.infers_discrepancy else [])]
 
 
 def _sampled(fit: Fit, seed: int, chains: int, warmup: int, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Chains of free parameters and s, physical, (chains, count, free + 1), and which steps diverged."""
     rng = np.random.default_rng(seed)
-    whole, free, where = space(fit.model), fit.free, apparent(fit)
-    low, high = whole.natural_lower[free], whole.natural_upper[free]
-    start = where.natural_array(draws(fit, chains, rng))
+    moved = sampled(fit)
+    low, high = moved.low, moved.high
+    start = moved.unscaled(draws(fit, chains, rng))
     inside = np.clip((start[:, :-1] - low) / (high - low), INSIDE, 1.0 - INSIDE)
     least = 1e-3 * max(float(np.median(start[:, -1])), 1e-12)
     begin = np.column_stack([np.log(inside / (1.0 - inside)), np.log(np.maximum(start[:, -1], least))])
     keys = jax.random.split(jax.random.key(int(rng.integers(2**31))), chains)
     arrays, static = eqx.partition((fit.model, fit.data), eqx.is_array)
-    range_ = jnp.asarray(low), jnp.asarray(high)
-    places = tuple(int(k) for k in free)
-    x, diverged = _chains(arrays, static, places, where, range_, (keys, jnp.asarray(begin)), (warmup, count))
+    x, diverged = _chains(arrays, static, moved, (keys, jnp.asarray(begin)), (warmup, count))
     x = np.asarray(x)
     values, s = physical(fit, x.reshape(-1, x.shape[-1]))
-    return np.column_stack([values[:, free], s]).reshape(x.shape), np.asarray(diverged)
+    return np.column_stack([values[:, fit.free], s]).reshape(x.shape), np.asarray(diverged)
 
 
 @eqx.filter_jit
 def _chains(
     arrays: Any,
     static: Any,
-    free: tuple[int, ...],
-    where: Apparent,
-    range_: tuple[Array, Array],
+    moved: Coordinates,
     begin: tuple[Array, Array],
     steps: tuple[int, int],
 ) -> tuple[Array, Array]:
     """NUTS from several starts: sampled coordinates, (chains, draws, d), and whether each step diverged."""
     blackjax = require()
     template, data = eqx.combine(arrays, static)
-    weights = np.array(where.weights, int)
+    low, high = jnp.asarray(moved.low), jnp.asarray(moved.high)
 
-    def sampled(u: Array) -> tuple[Array, Array]:
+    def placed(u: Array) -> tuple[Array, Array]:
         """The sampled coordinates of u, and ln |∂x/∂u|."""
-        low, high = range_
         t = low + (high - low) * jax.nn.sigmoid(u[:-1])
         jacobian = jnp.sum(jnp.log(high - low) + jax.nn.log_sigmoid(u[:-1]) + jax.nn.log_sigmoid(-u[:-1])) + u[-1]
         x = jnp.append(t, jnp.exp(u[-1]))
-        if not where.weights:
-            return x, jacobian
-        return x.at[weights].multiply(jnp.exp(x[where.scale])), jacobian + len(weights) * x[where.scale]
+        return moved.scaled(x), jacobian + len(moved.weights) * x[moved.scale]
 
     def target(u: Array) -> Array:
-        x, jacobian = sampled(u)
-        return log_density_at(template, data, free, where, x) + jacobian
+        x, jacobian = placed(u)
+        return log_density_at(template, data, moved, x) + jacobian
 
     def one(chain: tuple[Array, Array]) -> tuple[Array, Array]:
         first, second = jax.random.split(chain[0])
@@ -277,7 +266,7 @@ def _chains(
         def step(state: Any, key: Array) -> tuple[Any, tuple[Array, Array]]:
             info: Any
             state, info = kernel.step(key, state)
-            return state, (sampled(state.position)[0], info.is_divergent)
+            return state, (placed(state.position)[0], info.is_divergent)
 
         return jax.lax.scan(step, state, jax.random.split(second, steps[1]))[1]
 

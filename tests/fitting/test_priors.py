@@ -8,8 +8,9 @@ from scipy import stats
 import fitmat as fm
 from fitmat.errors import ModelError
 from fitmat.fitting import priors
+from fitmat.fitting.coordinates import coordinates
 from fitmat.measurements.instrument import IDEAL
-from fitmat.models.parameters import entries, space
+from fitmat.models.parameters import entries
 
 EXACT = 1e-5
 """Relative; the solver's tolerance and the Gaussian's second order are far below."""
@@ -49,8 +50,8 @@ def test_draws_follow_the_truncated_prior() -> None:
     places = {e.name: e.place.start for e in entries(model)}
     free = np.array([places["kd"], places["alpha"]])
     values, s = priors.draw(model, prior, free, 4000, np.random.default_rng(0))
-    coordinates = space(model)
-    low, high = coordinates.natural_lower[places["alpha"]], coordinates.natural_upper[places["alpha"]]
+    every = coordinates(model)
+    low, high = every.low[places["alpha"]], every.high[places["alpha"]]
     kd = stats.truncnorm(-0.02 / 0.03, 0.98 / 0.03, 0.02, 0.03)
     p = [
         stats.kstest(values[:, places["kd"]], kd.cdf).pvalue,

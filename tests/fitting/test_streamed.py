@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 
 import fitmat as fm
 from fitmat.fitting import information, streamed
+from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.likelihood import log_density, prepare
 from fitmat.fitting.result import Fit
 from fitmat.fitting.streamed_sums import Sums, block_sums
@@ -21,7 +22,7 @@ from fitmat.measurements.instrument import Instrument
 from fitmat.measurements.large import chunks, noise
 from fitmat.measurements.large.chunks import Chunks
 from fitmat.measurements.noise import measured_noise
-from fitmat.models.parameters import space, vector, with_vector
+from fitmat.models.parameters import vector, with_vector
 
 MODEL = "lambert+blinn-phong"
 
@@ -224,11 +225,11 @@ def test_the_sums_are_derivatives_of_the_likelihood() -> None:
     m = measured(fm.model(MODEL, kd=0.3, ks=0.2, exponent=20.0), 1).rows(np.arange(0, 4000, 4))
     data, best, s = prepare(m, measured_noise(m)), fm.model(MODEL, kd=0.31, ks=0.18, exponent=22.0), 0.01
     sums = block_sums(best, data, jnp.asarray(s))
-    coordinates = space(best)
-    at = np.append(coordinates.natural_array(np.asarray(vector(best))), s)
+    every = coordinates(best)
+    at = np.append(every.natural(np.asarray(vector(best))), s)
 
     def cost(x: np.ndarray) -> float:
-        moved = with_vector(best, coordinates.physical(jnp.asarray(x[:-1])))
+        moved = with_vector(best, every.physical(jnp.asarray(x[:-1])))
         return -float(log_density(moved, data, jnp.asarray(x[-1])))
 
     def slope(x: np.ndarray) -> np.ndarray:

@@ -11,13 +11,14 @@ import pytest
 from scipy.optimize import least_squares
 
 import fitmat as fm
+from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.likelihood import every_residual
 from fitmat.fitting.priors import natural_sd
 from fitmat.fitting.result import Fit
 from fitmat.judgement.identifiability.profiles import Profile, profiles
 from fitmat.judgement.identifiability.ridge import ridge
 from fitmat.judgement.identifiability.verdicts import CONTRACTED, STATES, Identifiability, identify
-from fitmat.models.parameters import space, with_vector
+from fitmat.models.parameters import with_vector
 from fitmat.uncertainty.posterior import Posterior
 
 CATALOGUE = Path(__file__).parents[2] / "data" / "synthetic"
@@ -101,24 +102,24 @@ def test_the_ridge_has_the_moments_of_its_closed_form(blind: Fit, blind_profiles
 def test_profiles_are_the_minima_that_scipy_finds(ordinary: Fit) -> None:
     """η held, the others and nothing else free, by SciPy's trust region in the natural coordinates."""
     profile = profiles(ordinary)[3]
-    whole = space(ordinary.model)
+    whole = coordinates(ordinary.model)
     s = jnp.asarray(ordinary.discrepancy)
 
     @jax.jit
     def every(t: jax.Array) -> jax.Array:
         return every_residual(with_vector(ordinary.model, whole.physical(t)), ordinary.data, s)
 
-    best = 0.5 * np.sum(np.asarray(every(jnp.asarray(whole.natural_array(ordinary.values)))) ** 2)
+    best = 0.5 * np.sum(np.asarray(every(jnp.asarray(whole.natural(ordinary.values)))) ** 2)
     for k in (2, 10, 22, 30):
         at = profile.points.at[k]
-        start = whole.natural_array(ordinary.values)[:3]
+        start = whole.natural(ordinary.values)[:3]
         solved = least_squares(lambda t, at=at: np.asarray(every(jnp.asarray([*t, at]))), start, x_scale=[1, 1, 0.1])
         assert profile.points.rise[k] == pytest.approx(solved.cost - best, abs=1e-3)  # of Δ, which is judged at 1.92
 
 
 def test_profiles_agree_with_laplace_where_all_is_determined(ordinary: Fit) -> None:
     found = profiles(ordinary)
-    scale = np.where(space(ordinary.model).log, ordinary.values, 1.0)
+    scale = np.where(coordinates(ordinary.model).ratio, ordinary.values, 1.0)
     np.testing.assert_allclose([p.sd for p in found], np.sqrt(np.diagonal(ordinary.covariance)) / scale, rtol=LOCAL)
     assert not any(any(p.open) for p in found)
     spread = np.sqrt(np.diagonal(ridge(ordinary, found).total()[1]))

@@ -10,9 +10,10 @@ from scipy.integrate import quad
 
 import fitmat as fm
 from fitmat.errors import ModelError
+from fitmat.fitting.coordinates import coordinates
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.laws import example
-from fitmat.models.parameters import entries, space, vector, with_vector
+from fitmat.models.parameters import entries, vector, with_vector
 from fitmat.models.registry import LOBES
 
 DIFFERENCES = 1e-7
@@ -122,11 +123,11 @@ def test_gradients_are_finite_differences(name: str, hemisphere: Hemisphere, sin
         return jnp.sum(with_vector(model, values)(wi, wo))
 
     f, reverse, forward = (jax.jit(jax.vmap(t(one), (None, 0, 0))) for t in (lambda g: g, jax.grad, jax.jacfwd))
-    coordinates, rng = space(model), np.random.default_rng(12)
-    low, span = coordinates.natural_lower, coordinates.natural_upper - coordinates.natural_lower
+    every, rng = coordinates(model), np.random.default_rng(12)
+    low, span = every.low, every.span
     angles = np.array([entry.param.unit == "°" for entry in entries(model) for _ in range(entry.size)])
     for _ in range(4):
-        point = np.asarray(coordinates.physical(jnp.array(low + span * rng.uniform(0.02, 0.98, len(low)))))
+        point = np.asarray(every.physical(jnp.array(low + span * rng.uniform(0.02, 0.98, len(low)))))
         slopes, value = np.asarray(reverse(point, wi, wo)), np.asarray(f(point, wi, wo))
         np.testing.assert_allclose(forward(point, wi, wo), slopes, rtol=EXACT, atol=EXACT * np.abs(slopes).max())
         # A tangent need not turn far to be felt: by the width of the lobe.

@@ -14,10 +14,11 @@ from hypothesis import strategies as st
 
 import fitmat as fm
 from fitmat._types import Scalar, Spectrum, Vec3
+from fitmat.fitting.coordinates import coordinates
 from fitmat.maths.directions import from_angles
 from fitmat.models import laws
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
-from fitmat.models.parameters import entries, param, space, vector, with_vector
+from fitmat.models.parameters import entries, param, vector, with_vector
 from fitmat.models.registry import LOBES, lobe_names
 from fitmat.models.terms.distributions import MASKINGS
 
@@ -136,7 +137,7 @@ def _albedo(model: AbstractBRDF, theta: float) -> float:
 def test_positive_and_reciprocal_wherever_hypothesis_looks(name: str) -> None:
     """For any directions and parameters within their bounds."""
     model = fm.model(name)
-    bounds, angle, turn = space(model), st.floats(0, np.pi / 2), st.floats(-np.pi, np.pi)
+    bounds, angle, turn = coordinates(model), st.floats(0, np.pi / 2), st.floats(-np.pi, np.pi)
     parts = st.lists(st.floats(0, 1), min_size=len(vector(model)), max_size=len(vector(model)))
     reciprocal = all("reciprocal" not in LOBES[lobe].breaks for lobe in lobe_names(name))
 
@@ -144,7 +145,7 @@ def test_positive_and_reciprocal_wherever_hypothesis_looks(name: str) -> None:
     @given(st.tuples(angle, angle), st.tuples(turn, turn), parts)
     def law(theta: tuple[float, float], phi: tuple[float, float], part: list[float]) -> None:
         wi, wo = jnp.array(from_angles(np.array(theta), np.array(phi)))
-        natural = bounds.natural_lower + (bounds.natural_upper - bounds.natural_lower) * np.array(part)
+        natural = bounds.low + (bounds.span) * np.array(part)
         drawn = with_vector(model, bounds.physical(jnp.array(natural)))
         there, back = _value(drawn, wi, wo), _value(drawn, wo, wi)
         assert there >= 0

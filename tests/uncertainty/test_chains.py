@@ -14,9 +14,10 @@ from scipy import stats
 
 import fitmat as fm
 from fitmat.errors import FitmatError
+from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.likelihood import log_likelihood, noise_scale
 from fitmat.fitting.result import Fit
-from fitmat.models.parameters import space, vector, with_vector
+from fitmat.models.parameters import vector, with_vector
 from fitmat.uncertainty.chains import CHUNK
 from fitmat.uncertainty.density import log_posterior
 from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, Diagnostics, Posterior, split_rhat
@@ -67,7 +68,7 @@ def test_the_target_is_likelihood_times_flat_priors(fit: Fit) -> None:
 def test_the_moves_leave_the_target_as_it_is(fit: Fit, sampled: Posterior) -> None:
     """Quantiles by importance sampling of 40,000 draws, a method without chains; only the target is shared."""
     rng, count = np.random.default_rng(1), 40_000
-    scale = np.where(space(fit.model).log, fit.values, 1.0)
+    scale = np.where(coordinates(fit.model).ratio, fit.values, 1.0)
     centre, shape = natural(fit, fit.values[None], np.zeros(1))[0, :4], fit.covariance / np.outer(scale, scale)
     wide, folded = rng.standard_t(5, (count, 4)), np.abs(rng.standard_cauchy(count))
     parameters = centre + wide @ np.linalg.cholesky(1.5 * shape).T

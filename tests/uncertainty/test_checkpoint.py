@@ -99,7 +99,7 @@ def steps(fit: Fit, folder: Path) -> int:
 def test_a_run_killed_twice_ends_with_the_same_chain(fit: Fit, whole: Posterior, tmp_path: Path) -> None:
     """Kill −9 of two processes; the third start, here, ends with the chain of a run that nobody killed."""
     folder = tmp_path / "kept"
-    code = CHILD.format(tests=str(Path(__file__).parents[1]), folder=str(folder))
+    code = CHILD.format(tests=str(Path(__file__).parent), folder=str(folder))
     for wanted in (1, 3):
         process = subprocess.Popen([sys.executable, "-c", code])
         end = time.monotonic() + PATIENCE

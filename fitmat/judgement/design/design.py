@@ -19,7 +19,6 @@ from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
 from fitmat.judgement.design.candidates import Candidates, Kind, Limits, proposed
 from fitmat.judgement.design.filters import Bank, Task, bank, scores
-from fitmat.judgement.identifiability.profiles import free_names
 from fitmat.measurements.noise import noise_law
 from fitmat.uncertainty.posterior import Posterior
 
@@ -151,7 +150,7 @@ def next_angles(
         history.append(best)
     truths = np.asarray(banks[0].centre)[np.asarray(banks[0].truths)]
     sd = np.sqrt(np.mean(start[0] ** 2, axis=0))
-    known = (fit, fits[-1] if match else None, target, kind, tuple(free_names(fit)), sd, truths)
+    known = (fit, fits[-1] if match else None, target, kind, fit.coordinates.names, sd, truths)
     return Design(*known, tuple(proposals), looked, gains)
 
 
@@ -163,7 +162,7 @@ def _refuse(fit: Fit, rival: Fit | None, target: str | None, numbers: tuple[int,
             raise FitmatError(f"{one.name}: every parameter is fixed, there is nothing to determine; free one.")
     if target == MATCH and rival is None:
         raise FitmatError("which model is right can be asked of two only: give a second model.")
-    known = [*(e.name for e in fit.entries if e.name not in fit.held), *free_names(fit)]
+    known = [*(e.name for e in fit.entries if e.name not in fit.held), *fit.coordinates.names]
     if target not in (None, MATCH, *known):
         raise FitmatError(f"{target!r} is no free parameter of {fit.name}: expected {', '.join(dict.fromkeys(known))}.")
     if min(numbers) < 1 or numbers[0] > MOST_STEPS:
@@ -173,7 +172,7 @@ def _refuse(fit: Fit, rival: Fit | None, target: str | None, numbers: tuple[int,
 def _wanted(fit: Fit, target: str | None) -> tuple[int, ...]:
     """Places of the target among the free parameters, every channel of it; () for all together."""
     owner = [e.name for e in fit.entries if e.name not in fit.held for _ in range(e.size)]
-    return tuple(k for k, names in enumerate(zip(owner, free_names(fit), strict=True)) if target in names)
+    return tuple(k for k, names in enumerate(zip(owner, fit.coordinates.names, strict=True)) if target in names)
 
 
 def _law(fit: Fit) -> Float[np.ndarray, "2 c"]:

@@ -11,13 +11,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from fitmat.fitting.coordinates import Coordinates
 from fitmat.fitting.likelihood import mapped
 from fitmat.fitting.losses import Loss
 from fitmat.fitting.result import Fit
 from fitmat.judgement.identifiability.profiles import profiles
 from fitmat.judgement.identifiability.ridge import Ridge, ridge
 from fitmat.models.base import AbstractBRDF
-from fitmat.models.parameters import space, with_vector
 
 TRUTHS = 16
 """Points of the ridge that are taken for the truth, equally likely."""
@@ -28,7 +28,7 @@ class Bank(eqx.Module):
 
     template: AbstractBRDF
     base: Array
-    places: tuple[int, ...] = eqx.field(static=True)
+    moved: Coordinates = eqx.field(static=True)
     loss: Loss = eqx.field(static=True)
     s: Array
     logs: Array
@@ -38,9 +38,7 @@ class Bank(eqx.Module):
 
     def predicted(self, t: Array, wi: Array, wo: Array) -> Array:
         """f κ at the natural coordinates t, (c,)."""
-        whole = space(self.template)
-        full = whole.natural(self.base).at[np.array(self.places)].set(t)
-        return jnp.atleast_1d(with_vector(self.template, whole.physical(full))(wi, wo)) * wi[2]
+        return jnp.atleast_1d(self.moved.model(self.template, self.base, t)(wi, wo)) * wi[2]
 
 
 class Task(eqx.Module):
@@ -58,8 +56,7 @@ def bank(fit: Fit) -> Bank:
     middles = (np.arange(TRUTHS) + 0.5) / TRUTHS
     truths = np.minimum(np.searchsorted(np.cumsum(found.weight), middles), len(found.weight) - 1)
     arrays = (np.asarray(fit.discrepancy), np.log(found.weight + 1e-300), found.centre, found.covariance, truths)
-    places = tuple(int(k) for k in fit.free)
-    return Bank(fit.model, jnp.asarray(fit.values), places, fit.data.loss, *(jnp.asarray(a) for a in arrays))
+    return Bank(fit.model, jnp.asarray(fit.values), fit.coordinates, fit.data.loss, *(jnp.asarray(a) for a in arrays))
 
 
 @eqx.filter_jit

@@ -12,11 +12,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.information import UNDETERMINED, inverse_information
 from fitmat.measurements.noise import noise_law
 from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
-from fitmat.models.parameters import entries, space, vector, with_vector
+from fitmat.models.parameters import entries, vector
 from fitmat.models.registry import model
 
 ROWS = 2048
@@ -100,23 +101,22 @@ def _information(
     truth: AbstractBRDF, wi: Array, wo: Array, weight: Array, absolute: Array, relative: Array
 ) -> Float[Array, "p p"]:
     """JᵀJ in natural coordinates, residuals in units of noise."""
-    coordinates = space(truth)
+    every, values = coordinates(truth), vector(truth)
 
     def predicted(t: Array) -> Array:
-        return evaluate_pairs(with_vector(truth, coordinates.physical(t)), wi, wo)[:, 0]
+        return evaluate_pairs(every.model(truth, values, t), wi, wo)[:, 0]
 
-    at = coordinates.natural(vector(truth))
+    at = every.natural(values)
     root = jnp.sqrt(weight) / jnp.hypot(absolute, relative * predicted(at))
     jacobian = jax.jacfwd(predicted)(at) * root[:, None]
     return jacobian.T @ jacobian
 
 
 def _verdicts(truth: AbstractBRDF, gloss: str, information: np.ndarray) -> list[Prospect]:
-    coordinates, values = space(truth), np.asarray(vector(truth))
-    span = coordinates.natural_upper - coordinates.natural_lower
-    sd = np.sqrt(np.diagonal(inverse_information(information, span)))
-    loose = ~(sd <= np.where(coordinates.log, UNDETERMINED["log"], UNDETERMINED["linear"] * span))
-    relative = np.where(coordinates.log, sd, sd / values)
+    every, values = coordinates(truth), np.asarray(vector(truth))
+    sd = np.sqrt(np.diagonal(inverse_information(information, every.span)))
+    loose = ~(sd <= np.where(every.ratio, UNDETERMINED["log"], UNDETERMINED["linear"] * every.span))
+    relative = sd / np.where(every.ratio, 1.0, values)
     found = []
     for entry in entries(truth):
         k = entry.place.start

@@ -12,13 +12,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.fitting.fitting import Chart
+from fitmat.fitting.coordinates import Coordinates
 from fitmat.fitting.information import expected_information, inverse_information
 from fitmat.fitting.likelihood import Data, every_residual, mapped
 from fitmat.fitting.result import Fit
 from fitmat.maths.least_squares import least_squares
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
-from fitmat.models.parameters import space, vector, with_vector
+from fitmat.models.parameters import vector, with_vector
 
 STEPS = 16
 """Points on either side of the best value."""
@@ -100,15 +100,15 @@ def profiles(fit: Fit) -> tuple[Profile, ...]:
     """
     if not len(fit.free) or not fit.finite:
         return ()
-    coordinates, places = space(fit.model), fit.free
-    low, high = coordinates.natural_lower[places], coordinates.natural_upper[places]
-    best = np.clip(coordinates.natural_array(fit.values)[places], low, high)
+    moved, places = fit.coordinates, fit.free
+    low, high = moved.low, moved.high
+    best = np.clip(moved.natural(fit.values), low, high)
     sides = [(k, sign) for k in range(len(places)) for sign in (-1.0, 1.0)]
     ends = _run(fit, np.array(sides), np.tile(best, (len(sides), 1)), np.full((len(sides), STEPS), np.nan))
     known = expected_information(fit.model, representative(fit), jnp.asarray(fit.discrepancy))
     here = Points(best, np.zeros(()), best, np.asarray(known)[np.ix_(places, places)])
     found = []
-    for k, name in enumerate(free_names(fit)):
+    for k, name in enumerate(moved.names):
         parts = zip(ends, (best[k], *here[1:]), strict=True)
         points = Points(*(np.concatenate([a[2 * k][::-1], [centre], a[2 * k + 1]]) for a, centre in parts))
         limits, opened = _interval(points.at, points.rise, STEPS, (low[k], high[k]))
@@ -132,28 +132,15 @@ def along(fit: Fit, place: int, held: Float[np.ndarray, " m"], guess: Float[np.n
 
 
 def _run(fit: Fit, sides: np.ndarray, start: np.ndarray, held: np.ndarray) -> Points:
-    free = tuple(int(k) for k in fit.free)
-    coordinates = space(fit.model)
-    span = (coordinates.natural_upper - coordinates.natural_lower)[fit.free]
+    span = fit.coordinates.span
     known = fit.information[np.ix_(fit.free, fit.free)]
     unit = np.minimum(np.sqrt(np.diagonal(inverse_information(known, span))), span)
     released = np.linalg.inv(known + np.diag(12.0 / span**2))
     slopes = released / np.diagonal(released)[:, None]
     tasks = tuple(jnp.asarray(part) for part in (unit, slopes, sides, start, held))
     s, values = jnp.asarray(fit.discrepancy), jnp.asarray(fit.values)
-    traced = _traced(fit.model, representative(fit), s, values, free, tasks)
+    traced = _traced(fit.model, representative(fit), s, values, fit.coordinates, tasks)
     return Points(*(np.asarray(part) for part in traced))
-
-
-def free_names(fit: Fit) -> list[str]:
-    """Names of the free parameters, with the channel where there are several."""
-    channels = fit.measurements.channels
-    return [
-        f"{e.name} {channels[k]}" if e.shape and len(channels) > 1 else e.name
-        for e in fit.entries
-        for k in range(e.size)
-        if e.name not in fit.held
-    ]
 
 
 def representative(fit: Fit) -> Data:
@@ -172,15 +159,15 @@ def representative(fit: Fit) -> Data:
 
 @eqx.filter_jit
 def _traced(
-    template: AbstractBRDF, data: Data, s: Array, values: Array, free: tuple[int, ...], tasks: tuple[Array, ...]
+    template: AbstractBRDF, data: Data, s: Array, values: Array, moved: Coordinates, tasks: tuple[Array, ...]
 ) -> tuple[Array, Array, Array, Array]:
     """What `Points` holds, for each task: a parameter and side, where to start, and the values to hold.
 
     Where these are NaN, they are chosen on the way. All arrays begin with (tasks, STEPS).
     """
-    chart, count, places = Chart(template, free), len(free), np.array(free)
+    count, places = moved.count, moved.index
     unit, slopes, sides, starts, given = tasks
-    low, high = jnp.asarray(chart.coordinates.natural_lower), jnp.asarray(chart.coordinates.natural_upper)
+    low, high = jnp.asarray(moved.low), jnp.asarray(moved.high)
     span = high - low
 
     def sine(t: Array) -> Array:
@@ -189,7 +176,7 @@ def _traced(
     def model(v: Array, k: Array, held: Array) -> AbstractBRDF:
         """With the free coordinates v of the others and the natural value of the held one."""
         u = jnp.zeros(count).at[_others(k, count)].set(v).at[k].set(sine(jnp.zeros(count).at[k].set(held))[k])
-        return chart.model(values, u)
+        return with_vector(template, moved.from_unbounded(values, u))
 
     def residual(v: Array, args: tuple[Data, Array, Array]) -> Array:
         data, k, held = args
@@ -213,7 +200,7 @@ def _traced(
             rise = 0.5 * (jnp.vdot(r, r) - jnp.vdot(first, first))
             matrix = expected_information(here, data, s)[np.ix_(places, places)]
             root = jnp.sqrt(2.0 * jnp.maximum(rise, 0.0))
-            found = (held, rise, chart.coordinates.natural(vector(here)[places]), matrix)
+            found = (held, rise, moved.natural(vector(here)), matrix)
             return (offset, last, v, root, _tangent(matrix, k, span)), found
 
         v = sine(jnp.clip(start, low + _INSIDE * span, high - _INSIDE * span))[_others(k, count)]

@@ -14,7 +14,6 @@ from scipy.interpolate import PchipInterpolator
 from fitmat.fitting.priors import natural_sd
 from fitmat.fitting.result import Fit
 from fitmat.judgement.identifiability.profiles import STEPS, Profile, along
-from fitmat.models.parameters import space
 
 NODES = 4 * STEPS
 """Gaussians on the ridge, fewer only for a single parameter."""
@@ -60,7 +59,7 @@ class Ridge:
 
     def draws(self, count: int, seed: int) -> Float[np.ndarray, "m p"]:
         """Physical parameter vectors along the bent ridge, kept within the bounds, fixed ones included."""
-        rng, coordinates, free = np.random.default_rng(seed), space(self.fit.model), self.fit.free
+        rng, moved = np.random.default_rng(seed), self.fit.coordinates
         which = rng.choice(len(self.weight), count, p=self.weight)
         at = self.centre[:, self.place]
         held = at[which] + np.sqrt(12.0) * self.along[which, self.place] * (rng.random(count) - 0.5)
@@ -70,11 +69,8 @@ class Ridge:
             curve = PchipInterpolator(at[apart], self.centre[apart])(np.clip(held, at[0], at[-1]))
         values, vectors = np.linalg.eigh(self.across)
         roots = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
-        natural = curve + np.einsum("mij,mj->mi", roots[which], rng.normal(size=(count, len(free))))
-        natural = np.clip(natural, coordinates.natural_lower[free], coordinates.natural_upper[free])
-        full = np.tile(self.fit.values, (count, 1))
-        full[:, free] = np.asarray(np.where(coordinates.log[free], np.exp(natural), natural))
-        return full
+        natural = curve + np.einsum("mij,mj->mi", roots[which], rng.normal(size=(count, moved.count)))
+        return moved.filled(self.fit.values, np.clip(natural, moved.low, moved.high))
 
 
 def ridge(fit: Fit, profiled: tuple[Profile, ...]) -> Ridge:

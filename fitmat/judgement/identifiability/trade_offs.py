@@ -12,7 +12,6 @@ from jaxtyping import Float
 
 from fitmat.fitting.priors import natural_sd
 from fitmat.fitting.result import Fit
-from fitmat.judgement.identifiability.profiles import free_names
 from fitmat.models.terms.fresnel import f0_from_eta, f0_from_ior
 
 CONDITION = 30.0
@@ -115,7 +114,7 @@ def groups(fit: Fit, draws: Float[np.ndarray, "m p"]) -> tuple[Group, ...]:
         draws: Of the posterior, physical vectors.
     """
     known = fit.information[np.ix_(fit.free, fit.free)]
-    names, diagonal = free_names(fit), np.diagonal(known)
+    names, diagonal = fit.coordinates.names, np.diagonal(known)
     prior = natural_sd(fit.model, fit.data.prior)[fit.free]
     telling = np.flatnonzero(diagonal * prior**2 > 1.0)
     if len(telling) < 2:
@@ -170,7 +169,7 @@ def _powers(fit: Fit, members: np.ndarray, every: np.ndarray) -> Combination | N
     stiff = np.linalg.eigh(np.cov(logs[1:].T))[1][:, 0]
     stiff = stiff / stiff[np.argmax(np.abs(stiff))]
     exponents = [Fraction(round(4 * float(p)), 4) for p in stiff]
-    names = [free_names(fit)[m] for m in members]
+    names = [fit.coordinates.names[m] for m in members]
     used = [(n, p) for n, p in zip(names, exponents, strict=True) if p]
     if len(used) < 2:
         return None

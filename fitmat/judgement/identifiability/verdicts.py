@@ -14,7 +14,6 @@ from fitmat.fitting.result import Fit
 from fitmat.judgement.identifiability.profiles import Profile, profiles
 from fitmat.judgement.identifiability.ridge import Ridge, ridge
 from fitmat.judgement.identifiability.trade_offs import Group, groups
-from fitmat.models.parameters import space
 from fitmat.text import html_table, interval, text_table, with_error
 from fitmat.uncertainty.posterior import Posterior
 
@@ -157,7 +156,7 @@ def identify(posterior: Posterior) -> Identifiability:
         return Identifiability(fit, (), np.zeros(0), ())
     prior = natural_sd(fit.model, fit.data.prior)[fit.free]
     draws = _draws(posterior, ridge(fit, profiled))
-    natural = space(fit.model).natural_array(draws)[:, fit.free]
+    natural = fit.coordinates.natural(draws)
     contraction = 1.0 - natural.var(axis=0) / prior**2
     verdicts = tuple(_verdict(fit, p, float(contraction[p.place]), float(prior[p.place])) for p in profiled)
     known = fit.information[np.ix_(fit.free, fit.free)]

@@ -12,11 +12,12 @@ from scipy.integrate import quad
 
 import fitmat as fm
 from fitmat.errors import ModelError
+from fitmat.fitting.coordinates import coordinates
 from fitmat.models.albedo import directional_albedo
 from fitmat.models.around.coat import RoughCoat, SmoothCoat, Varnish
 from fitmat.models.base import evaluate_pairs
 from fitmat.models.lobes.lambert import Lambert
-from fitmat.models.parameters import entries, space, vector, with_vector
+from fitmat.models.parameters import entries, vector, with_vector
 from fitmat.models.terms.fresnel import average_inside
 
 SINGLE = 1e-6
@@ -259,7 +260,7 @@ def test_gradients_are_finite_differences(hemisphere: Hemisphere, singular: Pair
 
         return values(point), jax.jacfwd(values)(point)
 
-    bounds, point = space(model), np.asarray(vector(model))
+    bounds, point = coordinates(model), np.asarray(vector(model))
     for corner in (bounds.lower, bounds.upper):
         assert all(np.isfinite(part).all() for part in both(jnp.array(corner)))
     value, slopes = (np.asarray(part)[:15] for part in both(jnp.array(point)))

@@ -10,11 +10,12 @@ from scipy.optimize import root_scalar
 from scipy.spatial.transform import Rotation
 
 import fitmat as fm
+from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.result import Fit
 from fitmat.maths.directions import from_angles
 from fitmat.models.around.tilt import Tilted
 from fitmat.models.base import evaluate_pairs
-from fitmat.models.parameters import entries, space, vector, with_vector
+from fitmat.models.parameters import entries, vector, with_vector
 
 EXACT = 1e-9
 """Relative; two ways to turn a vector differ by 1e-16, which a lobe of alpha 0.05 multiplies at grazing angles."""
@@ -164,7 +165,7 @@ def test_gradients_are_finite_differences(hemisphere: Hemisphere, singular: Pair
         return evaluate_pairs(with_vector(model, point), wi, wo)[:, 0]
 
     slopes = jax.jit(jax.jacfwd(values))
-    bounds = space(model)
+    bounds = coordinates(model)
     for point in (bounds.lower, bounds.upper, np.asarray(vector(model))):
         assert np.isfinite(slopes(jnp.array(point), special_i, special_o)).all()
     point = vector(model).at[names["tilt_x"]].set(2.0).at[names["tilt_y"]].set(-3.0)

@@ -39,12 +39,13 @@ import numpy as np
 import pytest
 from oracles import disney_brdf
 
+from fitmat.fitting.coordinates import coordinates
 from fitmat.maths.directions import from_angles
 from fitmat.models.base import evaluate, evaluate_pairs
 from fitmat.models.lobes.disney_2012 import Disney2012
 from fitmat.models.lobes.disney_2015 import Disney2015
 from fitmat.models.lobes.disney_terms import Clearcoat, Perceptual, Sheen, tint
-from fitmat.models.parameters import entries, space, vector, with_vector
+from fitmat.models.parameters import entries, vector, with_vector
 
 SHADER = 1e-9
 """Relative to the shader in extended precision; h loses 1e-16 next to α = 0.001 of the sharpest highlights."""
@@ -449,7 +450,7 @@ def test_what_a_model_says_of_itself(cls: Disney) -> None:
 def test_values_and_gradients_are_finite_at_every_bound(cls: Disney, singular: Pairs) -> None:
     """In the parameters and in ω_i, ω_o; defaults with each parameter at either bound, and 100 corners of the box."""
     model = _model(cls, base_color=np.full(3, 0.5))
-    bounds, default, rng = space(model), np.asarray(vector(model)), np.random.default_rng(8)
+    bounds, default, rng = coordinates(model), np.asarray(vector(model)), np.random.default_rng(8)
     single = [
         np.where(np.eye(len(default))[k] > 0, b, default)
         for k in range(len(default))

@@ -13,13 +13,14 @@ from oracles import field_papers, field_programs
 from scipy.integrate import quad
 from scipy.special import hyp2f1
 
+from fitmat.fitting.coordinates import coordinates
 from fitmat.maths.directions import from_angles
 from fitmat.models.base import AbstractBRDF, evaluate
 from fitmat.models.lobes.abg import ABg
 from fitmat.models.lobes.ashikhmin_shirley import AshikhminShirley, OneExponent, TwoExponents
 from fitmat.models.lobes.oren_nayar import EnergyPreservingOrenNayar, OrenNayar, OrenNayarFull
 from fitmat.models.lobes.ward import Ward, WardBounded
-from fitmat.models.parameters import entries, space, vector, with_vector
+from fitmat.models.parameters import entries, vector, with_vector
 from fitmat.models.terms.distributions import Anisotropic, Isotropic
 from fitmat.models.terms.fresnel import Schlick
 
@@ -408,7 +409,7 @@ def _slopes(model: AbstractBRDF, rows: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 def _corners(model: AbstractBRDF) -> np.ndarray:
     """All parameters at their lower or upper bounds, and each alone at either with the rest at default, (k, p)."""
-    bounds, default = space(model), np.asarray(vector(model))
+    bounds, default = coordinates(model), np.asarray(vector(model))
     alone = [
         np.where(np.arange(len(default)) == k, bound, default)
         for k in range(len(default))
@@ -430,8 +431,8 @@ def test_values_and_slopes_are_finite_at_every_bound(model: AbstractBRDF, singul
 @EVERY
 def test_slopes_are_those_of_differences(model: AbstractBRDF, hemisphere: Hemisphere) -> None:
     """In every parameter and in both directions, for parameters drawn within their bounds."""
-    count, rng, bounds = 60, np.random.default_rng(41), space(model)
-    low, span = bounds.natural_lower, bounds.natural_upper - bounds.natural_lower
+    count, rng, bounds = 60, np.random.default_rng(41), coordinates(model)
+    low, span = bounds.low, bounds.span
     values = np.array(bounds.physical(jnp.array(low + span * rng.uniform(0.1, 0.9, (count, len(low))))))
     point = np.concatenate([values, hemisphere(count, 42), hemisphere(count, 43)], axis=1)
 

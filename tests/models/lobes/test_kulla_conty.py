@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 import fitmat as fm
+from fitmat.fitting.coordinates import coordinates
 from fitmat.maths.directions import from_angles
 from fitmat.maths.quadrature import cosine_mean
 from fitmat.models.albedo import directional_albedo
 from fitmat.models.base import evaluate_pairs
 from fitmat.models.lobes.kulla_conty import KullaConty
 from fitmat.models.lobes.microfacet import Microfacet
-from fitmat.models.parameters import entries, space, vector, with_vector
+from fitmat.models.parameters import entries, vector, with_vector
 from fitmat.models.terms.distributions import GGX, AbstractDistribution, Beckmann, Isotropic
 from fitmat.models.terms.fresnel import White
 
@@ -188,7 +189,7 @@ def test_gradients_are_finite_differences(hemisphere: Hemisphere, singular: Pair
 
         return values(point), jax.jacfwd(values)(point)
 
-    bounds, point = space(model), np.asarray(vector(model))
+    bounds, point = coordinates(model), np.asarray(vector(model))
     for corner in (bounds.lower, bounds.upper):
         assert all(np.isfinite(part).all() for part in both(jnp.array(corner)))
     value, slopes = (np.asarray(part)[:20] for part in both(jnp.array(point)))
