@@ -8,7 +8,7 @@ import numpy as np
 
 from fitmat.fitting.result import Fit
 from fitmat.models.albedo import directional_albedo
-from fitmat.models.around.instrument import surface
+from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, evaluate
 
 ANGLES = np.deg2rad([0.0, 30.0, 60.0, 75.0, 85.0])

@@ -18,7 +18,7 @@ from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.match.distances import ANGLES, AZIMUTHS, Values
 from fitmat.match.regions import GRAZING_DEG
 from fitmat.maths.quadrature import lobe_rule
-from fitmat.models.around.instrument import surface
+from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, Sum
 from fitmat.models.conversion import exponent_from_alpha
 from fitmat.models.lobes.cook_torrance import CookTorrance

@@ -16,7 +16,7 @@ from jaxtyping import Array, Float
 from fitmat._types import Scalar
 from fitmat.match.regions import GRAZING_DEG, NGAN_DEG, REGIONS, incidence_panels, memberships
 from fitmat.maths.quadrature import Rule, lobe_rule
-from fitmat.models.around.instrument import surface
+from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import with_vector
 from fitmat.uncertainty.estimate import Estimate, band, estimate

@@ -24,7 +24,7 @@ from fitmat.match.distances import AZIMUTHS, METRICS, direction_weight, incidenc
 from fitmat.match.regions import incidence_panels
 from fitmat.maths.least_squares import least_squares
 from fitmat.maths.quadrature import Rule, lobe_rule
-from fitmat.models.around.instrument import surface
+from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.conversion import exponent_from_alpha
 from fitmat.models.parameters import check_range, entries, vector, with_vector

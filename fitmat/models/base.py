@@ -56,6 +56,58 @@ class AbstractBRDF(eqx.Module):
         """Albedo of what leaves in all directions alike, in [0, 1]; what a coat above sends back and forth."""
 
 
+class AbstractShape(eqx.Module):
+    """How wide a lobe is, and along which axes.
+
+    Attributes:
+        suffix: What it adds to the lobe's name.
+        isotropic: Whether it is the same along all axes.
+    """
+
+    suffix: ClassVar[str]
+    isotropic: ClassVar[bool]
+
+    @abstractmethod
+    def local(self, w: Vec3) -> Vec3:
+        """A direction in the frame whose x axis is the tangent."""
+
+
+class AbstractLobe(AbstractBRDF):
+    """One way of scattering light; isotropic unless one of its parts has axes.
+
+    Attributes:
+        label: Its name; braces hold what its parts add, as in "ward{roughness.suffix}".
+    """
+
+    label: ClassVar[str]
+
+    @property
+    def name(self) -> str:
+        """The label with what the parts add."""
+        return self.label.format_map(vars(self))
+
+    @property
+    def isotropic(self) -> bool:
+        """Where every shape among the parts is."""
+        return all(part.isotropic for part in vars(self).values() if isinstance(part, AbstractShape))
+
+
+class AbstractSpecular(AbstractLobe):
+    """A lobe around one direction, without diffuse light."""
+
+    def diffuse_albedo(self) -> Spectrum:
+        """0."""
+        return jnp.zeros(())
+
+
+class AbstractDiffuse(AbstractLobe):
+    """A lobe as wide as the hemisphere."""
+
+    def width(self) -> Scalar:
+        """1."""
+        return jnp.array(1.0)
+
+
 def specular_weight(doc: str = "specular weight; 1 for a bare surface") -> Any:
     """The parameter ks, in which a specular lobe is linear."""
     return param(0.0, 10.0, symbol="k_s", per_channel=True, weight=True, default=1.0, doc=doc)

@@ -54,12 +54,12 @@ def sellmeier_2(um: np.ndarray, first: float, pairs: Sequence[tuple[float, float
 
 def cauchy(um: np.ndarray, first: float, pairs: Sequence[tuple[float, float]]) -> np.ndarray:
     """N = A + Σ B λ^C."""
-    return first + sum(b * um**c for b, c in pairs)
+    return np.asarray(first + sum(b * um**c for b, c in pairs))
 
 
 def gas(um: np.ndarray, first: float, pairs: Sequence[tuple[float, float]]) -> np.ndarray:
     """N = 1 + A + Σ B/(C − λ⁻²)."""
-    return 1.0 + first + sum(b / (c - um**-2) for b, c in pairs)
+    return np.asarray(1.0 + first + sum(b / (c - um**-2) for b, c in pairs))
 
 
 FORMULAS: dict[int, Callable[..., np.ndarray]] = {1: sellmeier, 2: sellmeier_2, 5: cauchy, 6: gas}

@@ -25,8 +25,14 @@ UNDERFLOW = 1e-25
 EXACT = 1e-12
 """Relative; the same formula written twice in double precision."""
 
+TURNED = 1e-9
+"""Relative; turning directions rounds the half vector of narrow lobes."""
+
 QUADRATURE = 1e-8
 """Relative; scipy's adaptive rule on a smooth integrand."""
+
+AXES = {"tilt": {"tilt_x": 2.0}, "disney": {"anisotropic": 0.5}}
+"""Parameters by which models show their axes that hide them by default."""
 
 Hemisphere = Any
 Pairs = dict[str, tuple[np.ndarray, np.ndarray]]
@@ -239,3 +245,14 @@ def test_covers_and_bases_are_told_apart(name: str, message: str) -> None:
 def test_masking_reaches_lobes_and_coats() -> None:
     assert fm.model("rough-varnish-over-lambert", masking="separable").coat.masking == "separable"  # pyright: ignore
     assert fm.model("lambert+ggx", masking="v-cavity").lobes[1].masking == "v-cavity"  # pyright: ignore
+
+
+def test_only_models_with_axes_change_when_both_directions_turn(hemisphere: Hemisphere) -> None:
+    """An isotropic model depends on the difference of the azimuths; a brushed or tilted one says that it does not."""
+    wi, wo = hemisphere(60, 20), hemisphere(60, 21)
+    turn = np.array([[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
+    for name in map(example, LOBES):
+        with_axes = next((axes for family, axes in AXES.items() if family in name), {})
+        model = fm.model(name, **with_axes)
+        still = np.allclose(fm.evaluate(model, wi @ turn, wo @ turn), fm.evaluate(model, wi, wo), rtol=TURNED)
+        assert model.isotropic == still, name

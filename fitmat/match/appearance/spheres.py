@@ -21,7 +21,7 @@ from fitmat.match.appearance import scene
 from fitmat.match.appearance.colour import colouring, delta_e_2000, delta_e_itp, shown, to_srgb
 from fitmat.match.appearance.scene import Screen
 from fitmat.maths.directions import zenith
-from fitmat.models.around.instrument import surface
+from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.parameters import with_vector
 from fitmat.uncertainty.estimate import Estimate, estimate

@@ -14,8 +14,7 @@ from jaxtyping import Float
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import COS_MIN, above
 from fitmat.measurements.instrument import Instrument
-from fitmat.models.around.noise import Noisy
-from fitmat.models.around.tilt import Tilted
+from fitmat.models.around.shown import AbstractShown
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import param
 
@@ -25,7 +24,7 @@ RINGS, SPOKES = 5, 11
 _DENSE = 200
 
 
-class Seen(AbstractBRDF):
+class Seen(AbstractShown):
     r"""What an instrument reads of a base: its apertures, its calibration and its dark signal.
 
     .. math:: f = g \left( \frac{\sum_k w_k f_b(\omega_{i,k}, \omega_{o,k}) c_{i,k} c_{o,k}}
@@ -54,11 +53,6 @@ class Seen(AbstractBRDF):
         doc="dark signal and stray light, as f_r cosθ_o",
     )  # fmt: skip
 
-    @property
-    def name(self) -> str:
-        """That of the base: the instrument makes no other material of it."""
-        return self.base.name
-
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """The module's formula."""
         cones = self.instrument.source + self.instrument.receiver > 0
@@ -75,26 +69,6 @@ class Seen(AbstractBRDF):
         lights, sensors = jnp.asarray(rule[0]) @ _frame(wi), jnp.asarray(rule[1]) @ _frame(wo)
         product = jnp.asarray(rule[2]) * lights[:, 2] * sensors[:, 2]
         return product @ jax.vmap(self.base)(lights, sensors) / jnp.maximum(jnp.sum(product), COS_MIN)
-
-    def width(self) -> Scalar:
-        """That of the base."""
-        return self.base.width()
-
-    @property
-    def isotropic(self) -> bool:
-        """Where the base is."""
-        return self.base.isotropic
-
-    def diffuse_albedo(self) -> Spectrum:
-        """That of the base."""
-        return self.base.diffuse_albedo()
-
-
-def surface(model: AbstractBRDF) -> AbstractBRDF:
-    """The material itself: without what the instrument and the mount do to its measurement."""
-    while isinstance(model, Noisy | Seen | Tilted):
-        model = model.base
-    return model
 
 
 def _frame(w: Vec3) -> Float[jax.Array, "3 3"]:

@@ -6,6 +6,7 @@ It changes no value: the likelihood reads the noise.
 import jax.numpy as jnp
 
 from fitmat._types import Samples, Scalar, Spectrum, Vec3
+from fitmat.models.around.shown import AbstractShown
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import param
 
@@ -13,7 +14,7 @@ LEAST_ABSOLUTE, LEAST_RELATIVE = 1e-9, 1e-5
 """Lower bounds of the two parts of the noise."""
 
 
-class Noisy(AbstractBRDF):
+class Noisy(AbstractShown):
     """A base whose measurements scatter with σ² = a² + (b ȳ)², ȳ the level that neighbouring angles show.
 
     Parameters: absolute noise a in sr⁻¹, relative noise b; and those of the base.
@@ -31,11 +32,6 @@ class Noisy(AbstractBRDF):
         doc="noise as a fraction of the value",
     )  # fmt: skip
 
-    @property
-    def name(self) -> str:
-        """That of the base: noise makes no other material of it."""
-        return self.base.name
-
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """That of the base."""
         return self.base(wi, wo)
@@ -48,16 +44,3 @@ class Noisy(AbstractBRDF):
     def least_sigma(level: Samples) -> Samples:
         """What σ stays above whatever the parameters, (n, c)."""
         return 0.5 * jnp.sqrt(LEAST_ABSOLUTE**2 + (LEAST_RELATIVE * level) ** 2)
-
-    def width(self) -> Scalar:
-        """That of the base."""
-        return self.base.width()
-
-    @property
-    def isotropic(self) -> bool:
-        """Where the base is."""
-        return self.base.isotropic
-
-    def diffuse_albedo(self) -> Spectrum:
-        """That of the base."""
-        return self.base.diffuse_albedo()

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import COS_MIN, above
+from fitmat.models.around.shown import AbstractShown
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import param
 
@@ -19,7 +20,7 @@ def _tilt(symbol: str, axis: str) -> Scalar:
     )  # fmt: skip
 
 
-class Tilted(AbstractBRDF):
+class Tilted(AbstractShown):
     """A base whose normal leans: `tilt-over-BASE`, what `fitmat fit --tilt` fits.
 
     f = f_b(R ω_i, R ω_o) (n′·ω_i)/c_i,  n′ = (tan t_x, tan t_y, 1) normalised
@@ -46,14 +47,12 @@ class Tilted(AbstractBRDF):
         }
     )
 
+    prefix: ClassVar[str] = "tilt-over-"
+    level: ClassVar[bool] = False
+
     base: AbstractBRDF
     tilt_x: Scalar = _tilt("t_x", "x")
     tilt_y: Scalar = _tilt("t_y", "y")
-
-    @property
-    def name(self) -> str:
-        """`tilt-over-` and the base's name."""
-        return f"tilt-over-{self.base.name}"
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """The base in the tilted frame, per irradiance of the level one."""
@@ -68,16 +67,3 @@ class Tilted(AbstractBRDF):
         between = n + jnp.array([0.0, 0.0, 1.0])
         turned = w - (between @ w) / (1.0 + n[2]) * between
         return turned + jnp.array([0.0, 0.0, 2.0]) * (n @ w)
-
-    def width(self) -> Scalar:
-        """That of the base."""
-        return self.base.width()
-
-    @property
-    def isotropic(self) -> bool:
-        """No: the lean has an azimuth."""
-        return False
-
-    def diffuse_albedo(self) -> Spectrum:
-        """That of the base."""
-        return self.base.diffuse_albedo()

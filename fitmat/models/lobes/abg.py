@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import above
-from fitmat.models.base import AbstractBRDF
+from fitmat.models.base import AbstractSpecular
 from fitmat.models.parameters import param
 
 NARROWEST = 1e-4
@@ -20,7 +20,7 @@ NARROWEST = 1e-4
 _TINY = 1e-300
 
 
-class ABg(AbstractBRDF):
+class ABg(AbstractSpecular):
     """ABg, the three-parameter scatter of ASAP, FRED and Zemax OpticStudio.
 
     f = A/(B + |β − β₀|^g),  β − β₀ = the projection of ω_i + ω_o on the surface
@@ -43,6 +43,7 @@ class ABg(AbstractBRDF):
     Example: `fm.model("lambert+abg", kd=0.01, a=1e-3, b=1e-4, g=2)`
     """
 
+    label: ClassVar[str] = "abg"
     breaks: ClassVar[Mapping[str, str]] = MappingProxyType(
         {"energy": "A is free: at normal incidence and g = 2 it scatters πA ln(1 + 1/B), 2.18 at A = B = 1"}
     )
@@ -61,11 +62,6 @@ class ABg(AbstractBRDF):
         doc="slope of the wing; polished optics 1–3",
     )  # fmt: skip
 
-    @property
-    def name(self) -> str:
-        """`abg`."""
-        return "abg"
-
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """A/(B + |β − β₀|^g); the plateau A/B, without slope, at the mirror direction itself."""
         square = (wi[0] + wo[0]) ** 2 + (wi[1] + wo[1]) ** 2
@@ -76,12 +72,3 @@ class ABg(AbstractBRDF):
     def width(self) -> Scalar:
         """Half of B^(1/g), because |β − β₀| is about twice the slope of h; at least 10⁻⁴."""
         return jnp.clip(0.5 * self.b ** (1.0 / self.g), NARROWEST, 1.0)
-
-    @property
-    def isotropic(self) -> bool:
-        """Yes."""
-        return True
-
-    def diffuse_albedo(self) -> Spectrum:
-        """None."""
-        return jnp.zeros(())

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import COS_MIN, above, pair, rotated
-from fitmat.models.base import AbstractBRDF
+from fitmat.models.base import AbstractLobe, AbstractShape
 from fitmat.models.parameters import param
 from fitmat.models.terms.fresnel import Schlick
 
@@ -19,20 +19,13 @@ SERIES = 1e-4
 """Below this sin²θ_h the logarithm is summed as a series, whose first omitted term is 10⁻¹⁷ of it."""
 
 
-class AbstractExponents(eqx.Module):
-    """How sharp the lobe is, and along which axes."""
-
-    suffix: ClassVar[str]
-    isotropic: ClassVar[bool]
+class AbstractExponents(AbstractShape):
+    """How sharp the lobe is."""
 
     @property
     @abstractmethod
     def along(self) -> tuple[Scalar, Scalar]:
         """(n_u, n_v): the exponents along the tangent and across it."""
-
-    @abstractmethod
-    def local(self, w: Vec3) -> Vec3:
-        """A direction in the frame whose x axis is the tangent."""
 
 
 class OneExponent(AbstractExponents):
@@ -88,7 +81,7 @@ class TwoExponents(AbstractExponents):
         return rotated(w, -jnp.deg2rad(self.rotation))
 
 
-class AshikhminShirley(AbstractBRDF):
+class AshikhminShirley(AbstractLobe):
     """Ashikhmin & Shirley 2000, specular and diffuse.
 
     f = √((n_u+1)(n_v+1))/(8π) c_h^((n_u h_u² + n_v h_v²)/(1 − c_h²)) F(c_d)/(c_d max(c_i, c_o))
@@ -108,16 +101,13 @@ class AshikhminShirley(AbstractBRDF):
     Example: `fm.model("ashikhmin-shirley", kd=0.3, f0=0.05, exponent=200)`
     """
 
+    label: ClassVar[str] = "ashikhmin-shirley{exponents.suffix}"
+
     kd: Spectrum = param(
         0.0, 1.0, symbol="k_d", per_channel=True, weight=True, default=0.5, doc="albedo of the substrate"
     )  # fmt: skip
     exponents: AbstractExponents = eqx.field(default_factory=OneExponent)
     fresnel: Schlick = eqx.field(default_factory=Schlick)
-
-    @property
-    def name(self) -> str:
-        """`ashikhmin-shirley` with the suffix of the exponents."""
-        return "ashikhmin-shirley" + self.exponents.suffix
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """The specular lobe plus the coupled diffuse term."""
@@ -132,11 +122,6 @@ class AshikhminShirley(AbstractBRDF):
     def width(self) -> Scalar:
         """√(2/(n+2)) of the larger exponent n: the α of the microfacet lobe with the same curvature at its peak."""
         return jnp.minimum(jnp.sqrt(2.0 / (jnp.maximum(*self.exponents.along) + 2.0)), 1.0)
-
-    @property
-    def isotropic(self) -> bool:
-        """Where the exponents are."""
-        return self.exponents.isotropic
 
     def diffuse_albedo(self) -> Spectrum:
         """(23/28) kd (1 − F0): what the diffuse term reflects of light that comes evenly from all directions."""

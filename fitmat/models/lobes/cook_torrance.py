@@ -9,12 +9,12 @@ import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import above, pair
-from fitmat.models.base import AbstractBRDF, specular_weight
+from fitmat.models.base import AbstractSpecular, specular_weight
 from fitmat.models.terms.distributions import Beckmann, Isotropic, Masking, visibility
 from fitmat.models.terms.fresnel import AbstractFresnel, Dielectric
 
 
-class CookTorrance(AbstractBRDF):
+class CookTorrance(AbstractSpecular):
     """Cook & Torrance 1982, with the constants of the paper.
 
     f = ks F(c_d) D'(h) G(ω_i, ω_o)/(π c_i c_o),  D' = exp(−tan²θ_h/m²)/(m² c_h⁴)
@@ -35,6 +35,7 @@ class CookTorrance(AbstractBRDF):
     Example: `fm.model("lambert+cook-torrance", kd=0.3, ks=0.25, alpha=0.2, eta=1.5)`
     """
 
+    label: ClassVar[str] = "cook-torrance{fresnel.suffix}"
     breaks: ClassVar[Mapping[str, str]] = MappingProxyType(
         {"energy": "with ks = 1 it reflects up to 4 F0 of the light: D' = π D, and π where Walter has 4"}
     )
@@ -43,11 +44,6 @@ class CookTorrance(AbstractBRDF):
     roughness: Isotropic = eqx.field(default_factory=Isotropic)
     fresnel: AbstractFresnel = eqx.field(default_factory=Dielectric)
     masking: Masking = eqx.field(static=True, default="v-cavity")
-
-    @property
-    def name(self) -> str:
-        """`cook-torrance` with the Fresnel suffix."""
-        return "cook-torrance" + self.fresnel.suffix
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """ks F D' G/(π c_i c_o), where D' = π D of the normalised Beckmann distribution."""
@@ -59,12 +55,3 @@ class CookTorrance(AbstractBRDF):
     def width(self) -> Scalar:
         """Alpha itself."""
         return self.roughness.alpha
-
-    @property
-    def isotropic(self) -> bool:
-        """Yes."""
-        return True
-
-    def diffuse_albedo(self) -> Spectrum:
-        """None."""
-        return jnp.zeros(())

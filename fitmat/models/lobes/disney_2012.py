@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import COS_MIN, Pair, above
-from fitmat.models.base import AbstractBRDF
+from fitmat.models.base import AbstractLobe
 from fitmat.models.lobes.disney_terms import (
     Clearcoat,
     Perceptual,
@@ -24,7 +24,7 @@ from fitmat.models.terms.distributions import Slopes
 from fitmat.models.terms.fresnel import schlick
 
 
-class Disney2012(AbstractBRDF):
+class Disney2012(AbstractLobe):
     """Disney's principled BRDF of 2012: what artists want to say of a surface, in twelve numbers.
 
     f = (1 − metallic) (base_color/π · mix(f_d, f_ss, subsurface) + f_sheen) + F D G/(4 c_i c_o) + f_coat
@@ -61,6 +61,7 @@ class Disney2012(AbstractBRDF):
     Example: `fm.model("disney-2012", base_color=[0.6, 0.3, 0.2], roughness=0.4, clearcoat=0.5)`
     """
 
+    label: ClassVar[str] = "disney-2012"
     breaks: ClassVar[Mapping[str, str]] = MappingProxyType(
         {
             "energy": "white and rough (base_color = roughness = 1) it reflects 1.05 of the light at 0° and 1.44 at "
@@ -81,11 +82,6 @@ class Disney2012(AbstractBRDF):
     fabric: Sheen = eqx.field(default_factory=Sheen)
     coat: Clearcoat = eqx.field(default_factory=Clearcoat)
     remap: bool = eqx.field(static=True, default=True)
-
-    @property
-    def name(self) -> str:
-        """`disney-2012`."""
-        return "disney-2012"
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """(1 − metallic)(diffuse + sheen) + F D G/(4 c_i c_o) + coat."""
@@ -108,11 +104,6 @@ class Disney2012(AbstractBRDF):
     def width(self) -> Scalar:
         """The smaller slope, or the coat's alpha where that is smaller."""
         return narrowest(self.shape, self.coat)
-
-    @property
-    def isotropic(self) -> bool:
-        """No: anisotropic is a parameter."""
-        return False
 
     def diffuse_albedo(self) -> Spectrum:
         """base_color (1 − metallic), at normal incidence nearly."""

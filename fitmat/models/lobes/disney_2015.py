@@ -9,7 +9,7 @@ import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import Pair, above
-from fitmat.models.base import AbstractBRDF
+from fitmat.models.base import AbstractLobe
 from fitmat.models.lobes.disney_terms import (
     Clearcoat,
     Perceptual,
@@ -24,7 +24,7 @@ from fitmat.models.parameters import param
 from fitmat.models.terms.fresnel import dielectric, f0_from_eta, schlick
 
 
-class Disney2015(AbstractBRDF):
+class Disney2015(AbstractLobe):
     """What Disney's BSDF of 2015 reflects: the model of 2012 with exact Fresnel and the masking of its own normals.
 
     f = (1 − metallic) (base_color/π · (f_d + f_retro) + f_sheen) + F D G/(4 c_i c_o) + f_coat
@@ -60,6 +60,7 @@ class Disney2015(AbstractBRDF):
     Example: `fm.model("disney-2015", base_color=[0.6, 0.3, 0.2], roughness=0.4, eta=1.5)`
     """
 
+    label: ClassVar[str] = "disney-2015"
     breaks: ClassVar[Mapping[str, str]] = MappingProxyType(
         {
             "energy": "white and rough (base_color = roughness = 1) it reflects 1.05 of the light at 0° and 1.44 at "
@@ -82,11 +83,6 @@ class Disney2015(AbstractBRDF):
     fabric: Sheen = eqx.field(default_factory=Sheen)
     coat: Clearcoat = eqx.field(default_factory=Clearcoat)
 
-    @property
-    def name(self) -> str:
-        """`disney-2015`."""
-        return "disney-2015"
-
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """(1 − metallic)(diffuse + retro-reflection + sheen) + F D G/(4 c_i c_o) + coat."""
         p, base, slopes = self.shape.pair(wi, wo), self.base_color, self.shape.slopes
@@ -103,11 +99,6 @@ class Disney2015(AbstractBRDF):
     def width(self) -> Scalar:
         """The smaller slope, or the coat's alpha where that is smaller."""
         return narrowest(self.shape, self.coat)
-
-    @property
-    def isotropic(self) -> bool:
-        """No: anisotropic is a parameter."""
-        return False
 
     def diffuse_albedo(self) -> Spectrum:
         """base_color (1 − metallic), at normal incidence nearly."""

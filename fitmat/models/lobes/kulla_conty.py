@@ -1,4 +1,9 @@
-"""Kulla and Conty's compensation: a microfacet lobe that gives back the energy which single scattering loses."""
+"""Kulla and Conty's compensation: a microfacet lobe that gives back the energy which single scattering loses.
+
+What returns after several facets is too little to count as diffuse light below a coat.
+"""
+
+from typing import ClassVar
 
 import equinox as eqx
 import jax
@@ -7,7 +12,7 @@ import jax.numpy as jnp
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import above
 from fitmat.maths.quadrature import Curve, cosine_mean, curve, lobe_rule
-from fitmat.models.base import AbstractBRDF, specular_weight
+from fitmat.models.base import AbstractSpecular, specular_weight
 from fitmat.models.lobes.microfacet import Microfacet
 from fitmat.models.terms.distributions import GGX, AbstractDistribution, Isotropic, Masking
 from fitmat.models.terms.fresnel import AbstractFresnel, Dielectric, White, average
@@ -16,7 +21,7 @@ NODES = (32, 16)
 """Of the quadrature of E(μ), zenith and azimuth; E is then off by at most 0.002, by 0.006 for alpha < 0.01."""
 
 
-class KullaConty(AbstractBRDF):
+class KullaConty(AbstractSpecular):
     """Microfacet reflection that conserves energy (`ggx-kc`, `beckmann-kc`), after Kulla & Conty 2017.
 
     f = ks (F D G/(4 c_i c_o) + F_ms (1 − E(c_i))(1 − E(c_o))/(π (1 − E_avg))),
@@ -40,16 +45,13 @@ class KullaConty(AbstractBRDF):
     Example: `fm.model("ggx-kc-conductor", alpha=0.5, eta=0.2, kappa=3.5)`
     """
 
+    label: ClassVar[str] = "{distribution.label}-kc{fresnel.suffix}"
+
     ks: Spectrum = specular_weight()
     roughness: Isotropic = eqx.field(default_factory=Isotropic)
     fresnel: AbstractFresnel = eqx.field(default_factory=Dielectric)
     distribution: AbstractDistribution = eqx.field(default_factory=GGX)
     masking: Masking = eqx.field(static=True, default="correlated")
-
-    @property
-    def name(self) -> str:
-        """`ggx-kc` or `beckmann-kc` with the Fresnel suffix."""
-        return self.distribution.label + "-kc" + self.fresnel.suffix
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """Single scattering plus what the other facets return."""
@@ -77,12 +79,3 @@ class KullaConty(AbstractBRDF):
     def width(self) -> Scalar:
         """Alpha itself."""
         return self.roughness.alpha
-
-    @property
-    def isotropic(self) -> bool:
-        """Yes."""
-        return True
-
-    def diffuse_albedo(self) -> Spectrum:
-        """None: what returns after several facets is little."""
-        return jnp.zeros(())

@@ -1,14 +1,16 @@
 """The Lambert model: a perfectly diffuse surface."""
 
+from typing import ClassVar
+
 import jax.numpy as jnp
 
-from fitmat._types import Scalar, Spectrum, Vec3
+from fitmat._types import Spectrum, Vec3
 from fitmat.maths.directions import above
-from fitmat.models.base import AbstractBRDF
+from fitmat.models.base import AbstractDiffuse
 from fitmat.models.parameters import param
 
 
-class Lambert(AbstractBRDF):
+class Lambert(AbstractDiffuse):
     """Lambert: the same radiance in every direction.
 
     f = kd/π
@@ -22,27 +24,15 @@ class Lambert(AbstractBRDF):
     Example: `fm.model("lambert", kd=0.5)`
     """
 
+    label: ClassVar[str] = "lambert"
+
     kd: Spectrum = param(
         0.0, 1.0, symbol="k_d", per_channel=True, weight=True, default=0.5, doc="diffuse albedo"
     )  # fmt: skip
 
-    @property
-    def name(self) -> str:
-        """`lambert`."""
-        return "lambert"
-
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """kd/π."""
         return jnp.where(above(wi, wo), self.kd / jnp.pi, 0.0)
-
-    def width(self) -> Scalar:
-        """As wide as the hemisphere."""
-        return jnp.array(1.0)
-
-    @property
-    def isotropic(self) -> bool:
-        """Yes."""
-        return True
 
     def diffuse_albedo(self) -> Spectrum:
         """The parameter itself."""

@@ -1,11 +1,13 @@
 """The microfacet reflection of today's renderers: GGX or Beckmann normals, any roughness, Fresnel and masking."""
 
+from typing import ClassVar
+
 import equinox as eqx
 import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import above
-from fitmat.models.base import AbstractBRDF, specular_weight
+from fitmat.models.base import AbstractSpecular, specular_weight
 from fitmat.models.terms.distributions import (
     GGX,
     AbstractDistribution,
@@ -17,7 +19,7 @@ from fitmat.models.terms.distributions import (
 from fitmat.models.terms.fresnel import AbstractFresnel, Dielectric
 
 
-class Microfacet(AbstractBRDF):
+class Microfacet(AbstractSpecular):
     """A surface of tiny mirrors with GGX (`ggx`) or Beckmann (`beckmann`) normals.
 
     f = ks F(c_d) D(h) G(ω_i, ω_o)/(4 c_i c_o)
@@ -41,16 +43,13 @@ class Microfacet(AbstractBRDF):
     Example: `fm.model("lambert+ggx", kd=0.3, alpha=0.2, eta=1.5)`
     """
 
+    label: ClassVar[str] = "{distribution.label}{roughness.suffix}{fresnel.suffix}"
+
     ks: Spectrum = specular_weight()
     roughness: AbstractRoughness = eqx.field(default_factory=Isotropic)
     fresnel: AbstractFresnel = eqx.field(default_factory=Dielectric)
     distribution: AbstractDistribution = eqx.field(default_factory=GGX)
     masking: Masking = eqx.field(static=True, default="correlated")
-
-    @property
-    def name(self) -> str:
-        """`ggx` or `beckmann` with the suffixes of roughness and Fresnel."""
-        return self.distribution.label + self.roughness.suffix + self.fresnel.suffix
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """ks F D G/(4 c_i c_o)."""
@@ -62,12 +61,3 @@ class Microfacet(AbstractBRDF):
     def width(self) -> Scalar:
         """The smaller slope."""
         return self.roughness.width()
-
-    @property
-    def isotropic(self) -> bool:
-        """Where the roughness is."""
-        return self.roughness.isotropic
-
-    def diffuse_albedo(self) -> Spectrum:
-        """None."""
-        return jnp.zeros(())

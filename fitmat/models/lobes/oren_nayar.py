@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import COS_MIN, above
-from fitmat.models.base import AbstractBRDF
+from fitmat.models.base import AbstractDiffuse
 from fitmat.models.parameters import param
 
 MEAN_B = 2.0 / 3.0 - 64.0 / (45.0 * jnp.pi)
@@ -38,7 +38,7 @@ def _sigma() -> Any:
     )  # fmt: skip
 
 
-class OrenNayar(AbstractBRDF):
+class OrenNayar(AbstractDiffuse):
     """Oren & Nayar 1994, the qualitative model: rough diffuse as renderers have it.
 
     f = kd/π (A + B max(0, cosΔφ) sinα tanβ),  A = 1 − ½σ²/(σ² + 0.33),  B = 0.45σ²/(σ² + 0.09)
@@ -58,17 +58,13 @@ class OrenNayar(AbstractBRDF):
     Example: `fm.model("oren-nayar", kd=0.5, sigma_n=20)`
     """
 
+    label: ClassVar[str] = "oren-nayar"
     breaks: ClassVar[Mapping[str, str]] = MappingProxyType(
         {"energy": "with kd = 1 and σ = 11.4° it reflects 1.015 of the light at grazing incidence: A + B/2"}
     )
 
     kd: Spectrum = _kd()
     sigma_n: Scalar = _sigma()
-
-    @property
-    def name(self) -> str:
-        """`oren-nayar`."""
-        return "oren-nayar"
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """kd/π (A + B max(0, s)/max(c_i, c_o)), s = sinθ_i sinθ_o cosΔφ."""
@@ -81,22 +77,13 @@ class OrenNayar(AbstractBRDF):
         variance = jnp.deg2rad(self.sigma_n) ** 2
         return 1.0 - 0.5 * variance / (variance + 0.33), 0.45 * variance / (variance + 0.09)
 
-    def width(self) -> Scalar:
-        """As wide as the hemisphere."""
-        return jnp.array(1.0)
-
-    @property
-    def isotropic(self) -> bool:
-        """Yes."""
-        return True
-
     def diffuse_albedo(self) -> Spectrum:
         """kd (A + B (2/3 − 64/(45π))), the exact hemispherical albedo."""
         a, b = self._coefficients()
         return self.kd * (a + b * MEAN_B)
 
 
-class OrenNayarFull(AbstractBRDF):
+class OrenNayarFull(AbstractDiffuse):
     """Oren & Nayar 1994, the full functional approximation with interreflection.
 
     f = kd/π (C1 + cosΔφ C2 tanβ + (1 − |cosΔφ|) C3 tan((α+β)/2)) + 0.17 kd²/π σ²/(σ²+0.13) (1 − cosΔφ (2β/π)²)
@@ -119,6 +106,7 @@ class OrenNayarFull(AbstractBRDF):
     Example: `fm.model("oren-nayar-full", kd=0.5, sigma_n=20)`
     """
 
+    label: ClassVar[str] = "oren-nayar-full"
     breaks: ClassVar[Mapping[str, str]] = MappingProxyType(
         {"energy": "with kd = 1 and σ = 18° it reflects 1.050 of the light at 89.9°"}
     )
@@ -126,24 +114,10 @@ class OrenNayarFull(AbstractBRDF):
     kd: Spectrum = _kd()
     sigma_n: Scalar = _sigma()
 
-    @property
-    def name(self) -> str:
-        """`oren-nayar-full`."""
-        return "oren-nayar-full"
-
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """kd/π (L1 + 0.17 kd L2), at least 0."""
         once, twice = _direct(wi, wo, self.sigma_n), _interreflected(wi, wo, self.sigma_n)
         return jnp.where(above(wi, wo), self.kd / jnp.pi * jnp.maximum(once + 0.17 * self.kd * twice, 0.0), 0.0)
-
-    def width(self) -> Scalar:
-        """As wide as the hemisphere."""
-        return jnp.array(1.0)
-
-    @property
-    def isotropic(self) -> bool:
-        """Yes."""
-        return True
 
     def diffuse_albedo(self) -> Spectrum:
         """The hemispherical albedo, but for the cut: cosΔφ averages out, and σ is a factor of what stays."""
@@ -152,7 +126,7 @@ class OrenNayarFull(AbstractBRDF):
         return self.kd * (once + 0.17 * self.kd * variance / (variance + 0.13))
 
 
-class EnergyPreservingOrenNayar(AbstractBRDF):
+class EnergyPreservingOrenNayar(AbstractDiffuse):
     """EON, the energy-preserving Oren–Nayar of Portsmouth, Kutz & Hill 2025.
 
     f = kd A/π (1 + r s/t) + kd_ms/π (1 − E(c_i))(1 − E(c_o))/(1 − Ē),  kd_ms = kd² Ē/(1 − kd (1 − Ē))
@@ -172,16 +146,13 @@ class EnergyPreservingOrenNayar(AbstractBRDF):
     Example: `fm.model("eon", kd=0.5, r=0.5)`
     """
 
+    label: ClassVar[str] = "eon"
+
     kd: Spectrum = _kd()
     r: Scalar = param(
         0.0, 1.0, symbol="r", default=0.5, starts=(0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 0.95),
         doc="roughness; 0 is Lambert, 1 the roughest",
     )  # fmt: skip
-
-    @property
-    def name(self) -> str:
-        """`eon`."""
-        return "eon"
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """kd/π A (1 + r s/t) plus the light that meets several facets; r cancels from 1 − Ē and stays finite at 0."""
@@ -199,15 +170,6 @@ class EnergyPreservingOrenNayar(AbstractBRDF):
         """kd_ms."""
         mean = self._average()
         return self.kd**2 * mean / (1.0 - self.kd * (1.0 - mean))
-
-    def width(self) -> Scalar:
-        """As wide as the hemisphere."""
-        return jnp.array(1.0)
-
-    @property
-    def isotropic(self) -> bool:
-        """Yes."""
-        return True
 
     def diffuse_albedo(self) -> Spectrum:
         """kd Ē + kd_ms (1 − Ē), the exact hemispherical albedo."""

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import above, half_vector, mirror
-from fitmat.models.base import AbstractBRDF, specular_weight
+from fitmat.models.base import AbstractSpecular, specular_weight
 from fitmat.models.parameters import param
 
 _ALBEDO = "specular weight; about the lobe's albedo at normal incidence"
@@ -33,7 +33,7 @@ def _blinn_width(exponent: Scalar) -> Scalar:
     return jnp.minimum(jnp.sqrt(2.0 / (exponent + 2.0)), 1.0)
 
 
-class Phong(AbstractBRDF):
+class Phong(AbstractSpecular):
     """Phong 1975, as a BRDF: a lobe around the mirror direction r = 2(n·ω_i)n − ω_i.
 
     f = ks (n+2)/(2π) max(r·ω_o, 0)ⁿ
@@ -49,13 +49,10 @@ class Phong(AbstractBRDF):
     Example: `fm.model("lambert+phong", kd=0.3, ks=0.1, exponent=40)`
     """
 
+    label: ClassVar[str] = "phong"
+
     ks: Spectrum = specular_weight(_ALBEDO)
     exponent: Scalar = _exponent()
-
-    @property
-    def name(self) -> str:
-        """`phong`."""
-        return "phong"
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """ks (n+2)/(2π) max(r·ω_o, 0)ⁿ."""
@@ -67,17 +64,8 @@ class Phong(AbstractBRDF):
         """Half that of Blinn's lobe: the angle to the mirror direction is twice the angle to h."""
         return _blinn_width(self.exponent) / 2.0
 
-    @property
-    def isotropic(self) -> bool:
-        """Yes."""
-        return True
 
-    def diffuse_albedo(self) -> Spectrum:
-        """None."""
-        return jnp.zeros(())
-
-
-class BlinnPhong(AbstractBRDF):
+class BlinnPhong(AbstractSpecular):
     """Blinn–Phong 1976 with the normalisation of real-time shading courses.
 
     f = ks (n+8)/(8π) max(n·h, 0)ⁿ
@@ -94,17 +82,13 @@ class BlinnPhong(AbstractBRDF):
     Example: `fm.model("lambert+blinn-phong", kd=0.3, ks=0.05, exponent=100)`
     """
 
+    label: ClassVar[str] = "blinn-phong"
     breaks: ClassVar[Mapping[str, str]] = MappingProxyType(
         {"energy": "with ks = 1 it reflects up to 7.5 % more than it receives: albedo 1.063 at n = 4, 1.075 at n = 10"}
     )
 
     ks: Spectrum = specular_weight(_ALBEDO)
     exponent: Scalar = _exponent()
-
-    @property
-    def name(self) -> str:
-        """`blinn-phong`."""
-        return "blinn-phong"
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """ks (n+8)/(8π) c_hⁿ."""
@@ -116,17 +100,8 @@ class BlinnPhong(AbstractBRDF):
         """√(2/(n+2))."""
         return _blinn_width(self.exponent)
 
-    @property
-    def isotropic(self) -> bool:
-        """Yes."""
-        return True
 
-    def diffuse_albedo(self) -> Spectrum:
-        """None."""
-        return jnp.zeros(())
-
-
-class BlinnPhongExact(AbstractBRDF):
+class BlinnPhongExact(AbstractSpecular):
     """Blinn–Phong 1976 with the exact normalisation at normal incidence.
 
     f = ks (n+2)(n+4)/(8π(2^(−n/2) + n)) max(n·h, 0)ⁿ
@@ -142,13 +117,10 @@ class BlinnPhongExact(AbstractBRDF):
     Example: `fm.model("lambert+blinn-phong-exact", kd=0.3, ks=0.05, exponent=100)`
     """
 
+    label: ClassVar[str] = "blinn-phong-exact"
+
     ks: Spectrum = specular_weight(_ALBEDO)
     exponent: Scalar = _exponent()
-
-    @property
-    def name(self) -> str:
-        """`blinn-phong-exact`."""
-        return "blinn-phong-exact"
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """ks (n+2)(n+4)/(8π(2^(−n/2) + n)) c_hⁿ."""
@@ -159,12 +131,3 @@ class BlinnPhongExact(AbstractBRDF):
     def width(self) -> Scalar:
         """√(2/(n+2))."""
         return _blinn_width(self.exponent)
-
-    @property
-    def isotropic(self) -> bool:
-        """Yes."""
-        return True
-
-    def diffuse_albedo(self) -> Spectrum:
-        """None."""
-        return jnp.zeros(())

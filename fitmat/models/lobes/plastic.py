@@ -1,18 +1,20 @@
 """Rough plastic: a GGX face over a coloured diffuse body, with the light that bounces between the two."""
 
+from typing import ClassVar
+
 import equinox as eqx
 import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import above
 from fitmat.models.around.coat import RoughCoat, Varnish
-from fitmat.models.base import AbstractBRDF
+from fitmat.models.base import AbstractLobe
 from fitmat.models.lobes.lambert import Lambert
 from fitmat.models.parameters import param
 from fitmat.models.terms.distributions import Masking
 
 
-class Plastic(AbstractBRDF):
+class Plastic(AbstractLobe):
     """A dielectric with a rough face over a diffuse body: one alpha and one eta for gloss and colour.
 
     f = ks F D G/(4 c_i c_o) + T(c_i) T(c_o) kd/(π η² (1 − kd R))
@@ -38,6 +40,8 @@ class Plastic(AbstractBRDF):
     Example: `fm.model("plastic", kd=0.4, alpha=0.1, eta=1.5)`
     """
 
+    label: ClassVar[str] = "plastic"
+
     ks: Scalar = param(
         0.0, 10.0, symbol="k_s", weight=True, default=1.0, doc="specular weight; 1 for a bare dielectric"
     )  # fmt: skip
@@ -55,11 +59,6 @@ class Plastic(AbstractBRDF):
     )  # fmt: skip
     masking: Masking = eqx.field(static=True, default="correlated")
 
-    @property
-    def name(self) -> str:
-        """`plastic`."""
-        return "plastic"
-
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """The face's lobe, and a Lambert body under a rough coat that absorbs nothing."""
         face = RoughCoat(self.eta, self.alpha, jnp.zeros(()), self.masking)
@@ -70,11 +69,6 @@ class Plastic(AbstractBRDF):
     def width(self) -> Scalar:
         """Alpha itself."""
         return self.alpha
-
-    @property
-    def isotropic(self) -> bool:
-        """Yes."""
-        return True
 
     def diffuse_albedo(self) -> Spectrum:
         """That of the body."""

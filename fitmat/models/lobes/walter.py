@@ -1,16 +1,17 @@
 """Walter's reflection of 2007 with its own constants: separable masking, and for Beckmann the rational G1."""
 
+from typing import ClassVar
+
 import equinox as eqx
-import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
-from fitmat.models.base import AbstractBRDF, specular_weight
+from fitmat.models.base import AbstractSpecular, specular_weight
 from fitmat.models.lobes.microfacet import Microfacet
 from fitmat.models.terms.distributions import GGX, AbstractDistribution, Isotropic
 from fitmat.models.terms.fresnel import AbstractFresnel, Dielectric
 
 
-class Walter(AbstractBRDF):
+class Walter(AbstractSpecular):
     """Walter et al. 2007, reflection, as printed: GGX (`walter-ggx`) or Beckmann (`walter-beckmann`) normals.
 
     f = ks F(c_d) D(h) G1(ω_i) G1(ω_o)/(4 c_i c_o)
@@ -28,15 +29,12 @@ class Walter(AbstractBRDF):
     Example: `fm.model("lambert+walter-ggx", kd=0.3, alpha=0.2, eta=1.5)`
     """
 
+    label: ClassVar[str] = "walter-{distribution.label}"
+
     ks: Spectrum = specular_weight()
     roughness: Isotropic = eqx.field(default_factory=Isotropic)
     fresnel: AbstractFresnel = eqx.field(default_factory=Dielectric)
     distribution: AbstractDistribution = eqx.field(default_factory=GGX)
-
-    @property
-    def name(self) -> str:
-        """`walter-ggx` or `walter-beckmann`."""
-        return "walter-" + self.distribution.label.removesuffix("-rational")
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """Eq. 20 with separable masking."""
@@ -45,12 +43,3 @@ class Walter(AbstractBRDF):
     def width(self) -> Scalar:
         """Alpha itself."""
         return self.roughness.alpha
-
-    @property
-    def isotropic(self) -> bool:
-        """Yes."""
-        return True
-
-    def diffuse_albedo(self) -> Spectrum:
-        """None."""
-        return jnp.zeros(())

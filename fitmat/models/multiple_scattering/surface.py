@@ -63,7 +63,9 @@ class Surface(eqx.Module):
     def __check_init__(self) -> None:
         """Refuse what cannot be sampled."""
         if not isinstance(self.distribution, GGX | Beckmann):
-            raise ModelError(f"distribution {self.distribution.label!r}: multiple scattering needs ggx or beckmann.")
+            raise ModelError(
+                f"distribution {type(self.distribution).__name__}: multiple scattering needs GGX or Beckmann."
+            )
         if self.transmits and not (isinstance(self.fresnel, Dielectric) and np.size(self.fresnel.eta) == 1):
             raise ModelError("a surface that transmits needs fresnel = Dielectric with one eta for all channels.")
 

@@ -14,6 +14,7 @@ from jax.scipy.special import erf
 
 from fitmat._types import Scalar, Vec3
 from fitmat.maths.directions import COS_MIN, Pair, pair, rotated
+from fitmat.models.base import AbstractShape
 from fitmat.models.parameters import param
 
 Masking = Literal["correlated", "separable", "v-cavity"]
@@ -25,20 +26,13 @@ Slopes = tuple[Scalar, Scalar]
 """(alpha_x, alpha_y): slope parameters along the tangent and across it."""
 
 
-class AbstractRoughness(eqx.Module):
-    """How rough a surface is, and along which axes."""
-
-    suffix: ClassVar[str]
-    isotropic: ClassVar[bool]
+class AbstractRoughness(AbstractShape):
+    """How rough a surface is; alpha_x is meant along the tangent."""
 
     @property
     @abstractmethod
     def slopes(self) -> Slopes:
         """(alpha_x, alpha_y)."""
-
-    @abstractmethod
-    def local(self, w: Vec3) -> Vec3:
-        """A direction in the frame whose x axis is the tangent, along which alpha_x is meant."""
 
     def pair(self, wi: Vec3, wo: Vec3) -> Pair:
         """Two directions and their half vector in the local frame; h is turned, not made of turned directions."""
@@ -104,7 +98,11 @@ class Anisotropic(AbstractRoughness):
 
 
 class AbstractDistribution(eqx.Module):
-    """Statistics of micro-normals for given slopes; directions are in the frame of the tangent."""
+    """Statistics of micro-normals for given slopes; directions are in the frame of the tangent.
+
+    Attributes:
+        label: What names of models call it.
+    """
 
     label: ClassVar[str]
 
@@ -155,7 +153,7 @@ class Beckmann(AbstractDistribution):
 class BeckmannRational(AbstractDistribution):
     """Beckmann's distribution with Walter's rational approximation of its masking, off by at most 0.35 %."""
 
-    label: ClassVar[str] = "beckmann-rational"
+    label: ClassVar[str] = "beckmann"
 
     def density(self, h: Vec3, slopes: Slopes) -> Scalar:
         """Beckmann's own."""

@@ -10,7 +10,8 @@ import fitmat as fm
 from fitmat.errors import ReadError
 from fitmat.maths.directions import from_angles
 from fitmat.measurements.instrument import IDEAL, Instrument
-from fitmat.models.around.instrument import Seen, cone_rule, surface
+from fitmat.models.around.instrument import Seen, cone_rule
+from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF
 
 DEGREE = np.pi / 180

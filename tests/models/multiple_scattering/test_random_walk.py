@@ -312,7 +312,7 @@ def test_wrong_input_is_refused(estimator: Estimator) -> None:
 
 
 def test_surfaces_that_cannot_be_walked_are_refused() -> None:
-    with pytest.raises(ModelError, match="'beckmann-rational': multiple scattering needs ggx or beckmann"):
+    with pytest.raises(ModelError, match="distribution BeckmannRational: multiple scattering needs GGX or Beckmann"):
         Surface(BeckmannRational(), (0.5, 0.5), White())
     for slopes in [(0.5, 3.0), (0.5, float("nan")), (0.5, 0.5, 0.5)]:
         with pytest.raises(ModelError, match=r"expected \(alpha_x, alpha_y\), each from 0.0001 to 2"):
