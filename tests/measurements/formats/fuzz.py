@@ -29,11 +29,11 @@ import test_astm
 import test_fred
 import test_lighttools
 import test_merl
+import test_parquet
 import test_rgl
 import test_ssdd
 import test_tensor
 import test_utia
-import test_writing
 import test_zemax
 from fuzz_faults import GENERIC, Fault, spliced
 from fuzz_objects import arrays, labelled
@@ -167,7 +167,7 @@ READERS = {
     "ssdd": Reader(test_ssdd.sample, (test_zemax.mutated,), "ssdd/*.ssdd"),
     "utia": Reader(_utia, (test_utia.mutated,), prepare=_small_utia),
     "utia_whole": Reader(test_utia.sample, (test_utia.mutated,)),
-    "parquet": Reader(test_writing.sample, (test_writing.mutated,)),
+    "parquet": Reader(test_parquet.sample, (test_parquet.mutated,)),
     "text": Reader(_table, (test_zemax.mutated,), "*/*.[cd][sa][vt]"),
     "frames": Reader(arrays),
     "xarray": Reader(labelled),
