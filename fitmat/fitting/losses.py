@@ -16,6 +16,7 @@ from jaxtyping import Array
 from fitmat.errors import ModelError
 from fitmat.fitting.stabilising import spread, stabilised
 from fitmat.measurements.samples import Measurements
+from fitmat.models.metrics import DARKEST, above_minus_one, cube_root, log_radiance, within
 
 Transform = Callable[[Array, Array, Array, Array], Array]
 """(x, noise, kappa, s) → T(x): x = f κ, noise = σ κ, kappa = cosθ_i, s the discrepancy; elementwise."""
@@ -25,12 +26,6 @@ T_DOF = 4.0
 
 BAD_SHARE, BAD_SPREAD = 0.05, 10.0
 """In "mixture" one value in twenty is bad, with ten times the spread of the others."""
-
-DARKEST = 1e-12
-"""sr⁻¹; logarithms of smaller model values are taken of this."""
-
-NGAN_LIMIT = np.deg2rad(80.0)
-"""Ngan et al. (2005) drop samples beyond this angle of incidence or reflection."""
 
 _GAUSSIAN_PEAK = -0.5 * np.log(2.0 * np.pi)
 
@@ -160,13 +155,12 @@ def _log10(x: Array, noise: Array, kappa: Array, s: Array) -> Array:
 
 def _log1p(x: Array, noise: Array, kappa: Array, s: Array) -> Array:
     del noise, kappa, s
-    return jnp.log1p(jnp.maximum(x, DARKEST - 1.0))
+    return log_radiance(x)
 
 
 def _cube_root(x: Array, noise: Array, kappa: Array, s: Array) -> Array:
     del noise, kappa, s
-    tiny = jnp.abs(x) < DARKEST
-    return jnp.where(tiny, x * DARKEST ** (-2.0 / 3.0), jnp.cbrt(jnp.where(tiny, 1.0, x)))
+    return cube_root(x)
 
 
 def _radiance(x: Array, noise: Array, kappa: Array, s: Array) -> Array:
@@ -196,7 +190,7 @@ def _is_positive(m: Measurements) -> np.ndarray:
 
 
 def _above_minus_one(m: Measurements) -> np.ndarray:
-    return m.value * m.wi[:, 2:] > -1.0
+    return above_minus_one(m.value * m.wi[:, 2:])
 
 
 def _off_normal(m: Measurements) -> np.ndarray:
@@ -204,7 +198,7 @@ def _off_normal(m: Measurements) -> np.ndarray:
 
 
 def _up_to_80(m: Measurements) -> np.ndarray:
-    return np.broadcast_to((np.maximum(m.theta_i, m.theta_o) <= NGAN_LIMIT)[:, None], m.value.shape)
+    return np.broadcast_to(within(m.theta_i, m.theta_o)[:, None], m.value.shape)
 
 
 DEFAULT = Loss("default", "z(y c_i) − z(f c_i)", "measurement noise and the model's own misfit, inferred together",

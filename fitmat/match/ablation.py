@@ -8,25 +8,22 @@ terms that both rise towards grazing comes down without either.
 import dataclasses
 from typing import ClassVar
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from fitmat._types import Scalar, Spectrum, Vec3
-from fitmat.match.distances import ANGLES, AZIMUTHS, Values
+from fitmat.match.distances import ANGLES, PairedDraws, lobe_rules
 from fitmat.match.regions import GRAZING_DEG
-from fitmat.maths.quadrature import lobe_rule
 from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, Sum
 from fitmat.models.conversion import exponent_from_alpha
 from fitmat.models.lobes.cook_torrance import CookTorrance
 from fitmat.models.lobes.microfacet import Microfacet
 from fitmat.models.lobes.walter import Walter
-from fitmat.models.parameters import with_vector
 from fitmat.models.terms.distributions import AbstractDistribution, Beckmann, Slopes
 from fitmat.models.terms.fresnel import AbstractFresnel
+from fitmat.models.values import Draws, blocks, surfaces, widths
 from fitmat.uncertainty.estimate import Estimate, band, estimate
 
 TERMS = {
@@ -175,18 +172,45 @@ def _microfacet(lobe: AbstractBRDF) -> Microfacet | None:
     return lobe if isinstance(lobe, Microfacet) else None
 
 
-def ablate(empirical: AbstractBRDF, microfacet: AbstractBRDF, values: Values) -> Ablation | None:
+class Ablated(AbstractBRDF):
+    """A model without each term of `TERMS` in turn: the values of all channels without the first, then the next."""
+
+    within: AbstractBRDF
+
+    @property
+    def name(self) -> str:
+        """That of the whole model."""
+        return self.within.name
+
+    def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
+        """(t c) values."""
+        return jnp.concatenate([jnp.atleast_1d(ablated(self.within, term)(wi, wo)) for term in TERMS])
+
+    def width(self) -> Scalar:
+        """That of the whole model."""
+        return self.within.width()
+
+    @property
+    def isotropic(self) -> bool:
+        """Where the whole model is."""
+        return self.within.isotropic
+
+    def diffuse_albedo(self) -> Spectrum:
+        """That of the whole model."""
+        return self.within.diffuse_albedo()
+
+
+def ablate(empirical: AbstractBRDF, microfacet: AbstractBRDF, draws: PairedDraws) -> Ablation | None:
     """How far the distance falls when the microfacet model loses its terms; None where it has none to lose.
 
     Args:
         empirical: Its shapes and static choices.
         microfacet: The same.
-        values: Parameters of both, the best fits first, then draws.
+        draws: Parameters of both, the best fits first, then draws.
     """
     if not can_ablate(microfacet):
         return None
-    vectors = jnp.asarray(values[0]), jnp.asarray(values[1])
-    squares, norm = (np.asarray(part) for part in _squares(empirical, microfacet, vectors))
+    squares, norm = _squares(surfaces(empirical, draws[0]), surfaces(microfacet, draws[1]))
 
     def falls(weight: np.ndarray) -> np.ndarray:
         """Of every draw and term, over incidences weighted by the columns of a matrix."""
@@ -205,25 +229,19 @@ def ablate(empirical: AbstractBRDF, microfacet: AbstractBRDF, values: Values) ->
     )
 
 
-@eqx.filter_jit
-def _squares(
-    empirical: AbstractBRDF, microfacet: AbstractBRDF, values: tuple[Array, Array]
-) -> tuple[Float[Array, "d t k"], Float[Array, "d k"]]:
+def _squares(empirical: Draws, microfacet: Draws) -> tuple[Float[np.ndarray, "d t k"], Float[np.ndarray, "d k"]]:
     """∫ (f_P − f)² c_o of the whole microfacet model and without each term, and ∫ f_M² c_o, channel means."""
-    isotropic = surface(empirical).isotropic and surface(microfacet).isotropic
-    turns = jnp.zeros(1) if isotropic else (jnp.arange(AZIMUTHS) + 0.5) * jnp.pi / AZIMUTHS
-
-    def at(theta: Array, phi: Array, p: AbstractBRDF, others: list[AbstractBRDF]) -> tuple[Array, Array]:
-        width = jnp.minimum(p.width(), others[0].width())
-        rule = lobe_rule(theta, width, phi_i=None if isotropic else phi, nodes=NODES)
-        f, *rest = (jax.vmap(lambda wo, g=g: jnp.atleast_1d(g(rule.wi, wo)))(rule.wo) for g in (p, *others))
-        return jnp.stack([(rule.weight @ (f - g) ** 2).mean() for g in rest]), (rule.weight @ rest[0] ** 2).mean()
-
-    def pair(both: tuple[Array, Array]) -> tuple[Array, Array]:
-        p, m = (surface(with_vector(f, v)) for f, v in zip((empirical, microfacet), both, strict=True))
-        others = [m, *(ablated(m, term) for term in TERMS)]
-        every = jax.vmap(lambda phi: jax.vmap(lambda theta: at(theta, phi, p, others))(jnp.asarray(ANGLES)))(turns)
-        squares, norm = (part.mean(axis=0) for part in every)
-        return squares.T, norm
-
-    return jax.lax.map(pair, values)
+    model, draws = microfacet
+    parts = [empirical, microfacet, (Ablated(model), draws)]
+    isotropic = empirical[0].isotropic and model.isotropic
+    narrowest = min(widths(*empirical).min(), widths(*microfacet).min())
+    rules = lobe_rules(ANGLES, narrowest, isotropic=isotropic, nodes=NODES)
+    turns = len(rules) // len(ANGLES)
+    squares, norm = np.zeros((len(draws), 1 + len(TERMS), len(ANGLES))), np.zeros((len(draws), len(ANGLES)))
+    for rows, k, (f, whole, without) in blocks(parts, [(rule.wi, rule.wo) for rule in rules]):
+        place, share = k // turns, rules[k].weight / turns
+        without = without.reshape(*without.shape[:2], len(TERMS), -1)
+        apart = ((f[:, :, None] - np.concatenate([whole[:, :, None], without], axis=2)) ** 2).mean(axis=3)
+        squares[rows, :, place] += np.einsum("dmt,m->dt", apart, share)
+        norm[rows, place] += (whole**2).mean(axis=2) @ share
+    return squares, norm

@@ -6,16 +6,12 @@ measurement and says nothing of which model is right.
 
 import dataclasses
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from fitmat.fitting.result import Fit
-from fitmat.match.distances import Values
-from fitmat.models.base import AbstractBRDF, evaluate_pairs, padded_length
-from fitmat.models.parameters import with_vector
+from fitmat.match.distances import PairedDraws
+from fitmat.models.values import values
 from fitmat.uncertainty.estimate import Estimate, band, estimate
 
 SEPARATED = 3.92
@@ -79,23 +75,21 @@ class Telling:
         return float(self.theta_i_deg[count - 1]) if count else None
 
 
-def tell_apart(empirical: Fit, microfacet: Fit, values: Values) -> Telling:
+def tell_apart(empirical: Fit, microfacet: Fit, draws: PairedDraws) -> Telling:
     """How well the measurements' instrument tells two models fitted to them apart.
 
     Args:
         empirical: Fit of the one; its noise counts.
         microfacet: Fit of the other, to the same measurements.
-        values: Parameters of both, the best fits first, then draws.
+        draws: Parameters of both, the best fits first, then draws.
     """
     m, sigma = empirical.measurements, empirical.noise.sigma
     usable = np.flatnonzero(m.valid.any(axis=1))
     rows = usable[np.unique(np.linspace(0, len(usable) - 1, ROWS).astype(int))]
-    extra = padded_length(len(rows)) - len(rows)
-    wi, wo = (jnp.asarray(np.pad(w[rows], ((0, extra), (0, 0)), mode="edge")) for w in (m.wi, m.wo))
-    vectors = jnp.asarray(values[0]), jnp.asarray(values[1])
-    z = np.asarray(_differences(empirical.model, microfacet.model, vectors, wi, wo))[:, : len(rows)]
+    models, directions = (empirical.model, microfacet.model), (m.wi[rows], m.wo[rows])
+    one, other = (values(model, part, *directions) for model, part in zip(models, draws, strict=True))
     valid = m.valid[rows]
-    z = np.where(valid, z / np.where(valid, sigma[rows], 1.0), 0.0)
+    z = np.where(valid, (one - other) / np.where(valid, sigma[rows], 1.0), 0.0)
     angles, group = _groups(np.rad2deg(m.theta_i[rows]))
     member = (group == np.arange(len(angles))[:, None]).astype(float)
     count = member @ valid.sum(axis=1)
@@ -121,16 +115,3 @@ def _groups(degrees: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if len(angles) > MOST_INCIDENCES:
         angles, group = np.unique(5.0 * np.round(degrees / 5.0), return_inverse=True)
     return angles, group.reshape(-1)
-
-
-@eqx.filter_jit
-def _differences(
-    one: AbstractBRDF, other: AbstractBRDF, values: tuple[Array, Array], wi: Array, wo: Array
-) -> Float[Array, "d n c"]:
-    """f_P − f_M of every draw, as the instrument shows both."""
-
-    def pair(both: tuple[Array, Array]) -> Array:
-        f = (evaluate_pairs(with_vector(model, v), wi, wo) for model, v in zip((one, other), both, strict=True))
-        return next(f) - next(f)
-
-    return jax.lax.map(pair, values)

@@ -4,21 +4,17 @@ It judges no distance and reads no measurements.
 """
 
 import dataclasses
-from collections.abc import Callable
-from typing import Literal
+from typing import Any
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from fitmat._types import Scalar
-from fitmat.match.regions import GRAZING_DEG, NGAN_DEG, REGIONS, incidence_panels, memberships
-from fitmat.maths.quadrature import Rule, lobe_rule
-from fitmat.models.around.shown import surface
+from fitmat.match.regions import GRAZING_DEG, REGIONS, incidence_panels, memberships
+from fitmat.maths.arrays import library
+from fitmat.maths.quadrature import AZIMUTH_NODES, ZENITH_NODES, Rule, lobe_rule
 from fitmat.models.base import AbstractBRDF
-from fitmat.models.parameters import with_vector
+from fitmat.models.metrics import METRICS, NGAN_DEG, Metric
+from fitmat.models.values import Draws, blocks, surfaces, widths
 from fitmat.uncertainty.estimate import Estimate, band, estimate
 
 AZIMUTHS = 4
@@ -26,63 +22,6 @@ AZIMUTHS = 4
 
 ANGLES = np.deg2rad(np.arange(0.0, 86.0, 5.0))
 """Incidence angles of all curves against incidence, radians."""
-
-EPSILON = 1e-3
-"""What the log ratio adds to both values, and the floor of its cosines (sr⁻¹; 1)."""
-
-_ROOT_FLOOR = 1e-12
-# ∛x has no slope at 0; a smaller f cosθ_i counts as this.
-
-
-@dataclasses.dataclass(frozen=True)
-class Metric:
-    """How the values of two BRDFs are compared: T = ∫∫ |t(f₁) − t(f₂)|ᵖ w over V = ∫∫ w, the same pairs of directions.
-
-    Attributes:
-        transform: t(f, c_i, c_o) of values (m, c) and cosines () and (m, 1).
-        weight: w: "solid" dω_i dω_o, "within" the same up to `NGAN_DEG`, "projected" c_i c_o dω_i dω_o.
-        kind: "relative" √(T/∫∫ f₂² w), "rms" √(T/V), "mean square" T/V, all with p = 2; "light" T/π with p = 1.
-        words: What it measures, and its unit.
-    """
-
-    transform: Callable[[Array, Scalar, Array], Array]
-    weight: Literal["solid", "within", "projected"]
-    kind: Literal["relative", "rms", "mean square", "light"]
-    words: str
-
-
-METRICS = {
-    "relative": Metric(
-        lambda f, ci, co: f, "projected", "relative",
-        "√(∫∫ (f₁ − f₂)² c_i c_o / ∫∫ f₂² c_i c_o): a fraction of the second model, weighted as light is",
-    ),
-    "ngan": Metric(
-        lambda f, ci, co: f * ci, "within", "rms",
-        f"rms of (f₁ − f₂) cosθ_i up to {NGAN_DEG:g}°, sr⁻¹ (Ngan et al. 2005): what the peak of the highlight says",
-    ),
-    "low-e1": Metric(
-        lambda f, ci, co: f * ci, "solid", "mean square",
-        "mean of ((f₁ − f₂) cosθ_i)² sinθ_i, sr⁻² (Löw et al. 2012, E1)",
-    ),
-    "low-e2": Metric(
-        lambda f, ci, co: jnp.log1p(f * ci), "solid", "mean square",
-        "mean of (ln(1 + f₁ cosθ_i) − ln(1 + f₂ cosθ_i))² sinθ_i (Löw et al. 2012, E2): bright parts count less",
-    ),
-    "cube-root": Metric(
-        lambda f, ci, co: jnp.cbrt(jnp.maximum(f * ci, _ROOT_FLOOR)), "solid", "rms",
-        "rms of ∛(f₁ cosθ_i) − ∛(f₂ cosθ_i), sr^(−1/3): closest to what eyes judge",
-    ),
-    "log-ratio": Metric(
-        lambda f, ci, co: jnp.log(f * jnp.maximum(ci * co, EPSILON) + EPSILON), "solid", "rms",
-        f"rms of ln((f₁κ + ε)/(f₂κ + ε)), κ = max(cosθ_i cosθ_o, {EPSILON:g}), ε = {EPSILON:g} sr⁻¹: faint parts count",
-    ),
-    "albedo": Metric(
-        lambda f, ci, co: f, "projected", "light",
-        "∫∫ |f₁ − f₂| c_i c_o/π: light that leaves in another direction, or not at all, as a fraction of what arrives",
-    ),
-}  # fmt: skip
-"""Metric → definition. Averages are over solid angle of ω_o and ω_i, Löw's over θ_i evenly in angle; f is averaged over
-the channels after |·|ᵖ. What is known of eyes: Fores et al. 2012; Lavoué et al. 2021 (README of the design)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -112,27 +51,26 @@ class Distances:
     albedos: Float[np.ndarray, "2 d k"]
 
 
-Values = tuple[Float[np.ndarray, "d p"], Float[np.ndarray, "d q"]]
+PairedDraws = tuple[Float[np.ndarray, "d p"], Float[np.ndarray, "d q"]]
 """Parameter vectors of both models, the best fits first, then posterior draws."""
 
 
 def measure_distances(
-    first: AbstractBRDF, second: AbstractBRDF, values: Values, measured: Float[np.ndarray, " a"]
+    first: AbstractBRDF, second: AbstractBRDF, draws: PairedDraws, measured: Float[np.ndarray, " a"]
 ) -> Distances:
     """Every distance of two models, with intervals over draws of their parameters.
 
     Args:
         first: Its shapes and static choices; mounts and instruments are taken away.
-        second: The same; its lobe, as wide as in the first row of `values`, says where the regions are.
-        values: Parameters of both.
+        second: The same; its lobe, as wide as in the first row of `draws`, says where the regions are.
+        draws: Parameters of both.
         measured: Incidence angles for `Distances.measured`, radians.
     """
     theta, solid = incidence_panels()
     nodes = np.concatenate([theta, measured, ANGLES])
     over, at, curves = np.split(np.arange(len(nodes)), [len(theta), len(theta) + len(measured)])
-    width = surface(with_vector(second, jnp.asarray(values[1][0]))).width()
-    vectors = jnp.asarray(values[0]), jnp.asarray(values[1])
-    top, bottom, albedos = (np.asarray(x) for x in _integrals(first, second, vectors, jnp.asarray(nodes), width))
+    pair = surfaces(first, draws[0]), surfaces(second, draws[1])
+    top, bottom, albedos = _integrals(pair, nodes)
     result: dict[str, dict] = {key: {} for key in ("whole", "by_region", "share", "by_incidence", "both")}
     for k, (name, metric) in enumerate(METRICS.items()):
         t, b = (part[:, over, k] * incidence_weight(metric, theta, solid)[:, None] for part in (top, bottom))
@@ -181,42 +119,67 @@ def _at_node(metric: Metric, top: np.ndarray, bottom: np.ndarray, theta: np.ndar
     return kept * factor * _over_nodes(metric, top, bottom)
 
 
-@eqx.filter_jit
 def _integrals(
-    first: AbstractBRDF, second: AbstractBRDF, values: tuple[Array, Array], theta_i: Array, width: Array
-) -> tuple[Float[Array, "d k m r"], Float[Array, "d k m r"], Float[Array, "d k 2"]]:
+    pair: tuple[Draws, Draws], theta_i: Float[np.ndarray, " k"]
+) -> tuple[Float[np.ndarray, "d k m r"], Float[np.ndarray, "d k m r"], Float[np.ndarray, "d k 2"]]:
     """∫ |t(f₁) − t(f₂)|ᵖ w and ∫ w (or ∫ f₂² w) over ω_o: draw, incidence, metric, region; and both albedos."""
-    isotropic = surface(first).isotropic and surface(second).isotropic
-    turns = jnp.zeros(1) if isotropic else (jnp.arange(AZIMUTHS) + 0.5) * jnp.pi / AZIMUTHS
-
-    def at(theta: Array, phi: Array, one: AbstractBRDF, two: AbstractBRDF) -> tuple[Array, Array, Array]:
-        rule = lobe_rule(theta, jnp.minimum(one.width(), two.width()), phi_i=None if isotropic else phi)
-        f = tuple(jax.vmap(lambda wo, g=g: jnp.atleast_1d(g(rule.wi, wo)))(rule.wo) for g in (one, two))
-        inside = memberships(rule.wi, rule.wo, width)
-        tops, bottoms = zip(*(_terms(metric, rule, *f) for metric in METRICS.values()), strict=True)
-        albedo = jnp.stack([(rule.weight @ g).mean() for g in f])
-        return jnp.stack(tops) @ inside, jnp.stack(bottoms) @ inside, albedo
-
-    def pair(both: tuple[Array, Array]) -> tuple[Array, Array, Array]:
-        one, two = (surface(with_vector(f, v)) for f, v in zip((first, second), both, strict=True))
-        every = jax.vmap(lambda phi: jax.vmap(lambda theta: at(theta, phi, one, two))(theta_i))(turns)
-        return jax.tree.map(lambda part: part.mean(axis=0), every)
-
-    return jax.lax.map(pair, values)
+    every = [widths(*part) for part in pair]
+    rules = lobe_rules(theta_i, min(w.min() for w in every), isotropic=all(model.isotropic for model, _ in pair))
+    turns = len(rules) // len(theta_i)
+    inside = [memberships(rule.wi, rule.wo, every[1][0]) for rule in rules]
+    shape = len(every[0]), len(theta_i), len(METRICS), len(REGIONS)
+    top, bottom, albedos = np.zeros(shape), np.zeros(shape), np.zeros((*shape[:2], 2))
+    for rows, k, (one, two) in blocks(pair, [(rule.wi, rule.wo) for rule in rules]):
+        place = k // turns
+        for m, (t, b) in enumerate(_terms(rules[k], inside[k], one, two)):
+            top[rows, place, m] += t / turns
+            bottom[rows, place, m] += b / turns
+        albedos[rows, place] += np.stack([f.mean(axis=2) @ rules[k].weight for f in (one, two)], axis=1) / turns
+    return top, bottom, albedos
 
 
-def _terms(metric: Metric, rule: Rule, one: Array, two: Array) -> tuple[Float[Array, " m"], Float[Array, " m"]]:
-    """Integrand and normaliser at the nodes of a rule, channel means, with the weight of ω_o."""
-    ci, co, w = rule.wi[2], rule.wo[:, 2:], direction_weight(metric, rule)
-    apart = jnp.abs(metric.transform(one, ci, co) - metric.transform(two, ci, co))
-    apart = apart if metric.kind == "light" else apart**2
-    return w * apart.mean(axis=1), w * (two**2).mean(axis=1) if metric.kind == "relative" else w
+def lobe_rules(
+    theta_i: Float[np.ndarray, " k"],
+    width: float,
+    *,
+    isotropic: bool,
+    nodes: tuple[int, int] = (ZENITH_NODES, AZIMUTH_NODES),
+) -> list[Rule]:
+    """A rule over ω_o at each incidence; where the surface is not isotropic `AZIMUTHS` of them, one after the other.
+
+    Args:
+        theta_i: Incidences in radians.
+        width: Slope-like width of the narrowest lobe of all draws, which every wider one is resolved with.
+        isotropic: Whether the models are.
+        nodes: In zenith and azimuth, as in `quadrature.lobe_rule`.
+    """
+    turns = [None] if isotropic else ((np.arange(AZIMUTHS) + 0.5) * np.pi / AZIMUTHS).tolist()
+    return [lobe_rule(theta, width, phi_i=turn, nodes=nodes) for theta in theta_i for turn in turns]
 
 
-def direction_weight(metric: Metric, rule: Rule) -> Float[Array, " m"]:
+def _terms(
+    rule: Rule, inside: Float[np.ndarray, "m r"], one: Float[np.ndarray, "d m c"], two: Float[np.ndarray, "d m c"]
+) -> list[tuple[Float[np.ndarray, "d r"], Float[np.ndarray, " r"]]]:
+    """T and V, or ∫ f₂² w, of every metric by region, channel means."""
+    ci, co = rule.wi[2], rule.wo[:, 2:]
+    transforms = {metric.transform for metric in METRICS.values()}
+    apart = {t: t(one, ci, co) - t(two, ci, co) for t in transforms}
+    mean = {t: (difference**2).mean(axis=2) for t, difference in apart.items()}
+    found = []
+    for metric in METRICS.values():
+        light = metric.kind == "light"
+        term = np.abs(apart[metric.transform]).mean(axis=2) if light else mean[metric.transform]
+        weight = direction_weight(metric, rule)[:, None] * inside
+        norm = (two**2).mean(axis=2) @ weight if metric.kind == "relative" else weight.sum(axis=0)
+        found.append((term @ weight, norm))
+    return found
+
+
+def direction_weight(metric: Metric, rule: Rule) -> Float[Any, " m"]:
     """What of w belongs to ω_o, at the nodes of a rule."""
     if metric.weight == "projected":
         return rule.weight
-    solid = jnp.where(rule.weight > 0, rule.weight / jnp.maximum(rule.wo[:, 2], 1e-12), 0.0)
+    xp = library(rule.weight)
+    solid = xp.where(rule.weight > 0, rule.weight / xp.maximum(rule.wo[:, 2], 1e-12), 0.0)
     low = rule.wo[:, 2] < np.cos(np.deg2rad(NGAN_DEG))
-    return jnp.where(low, 0.0, solid) if metric.weight == "within" else solid
+    return xp.where(low, 0.0, solid) if metric.weight == "within" else solid

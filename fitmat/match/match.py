@@ -8,7 +8,6 @@ import functools
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -17,7 +16,7 @@ from fitmat.fitting.result import Fit
 from fitmat.match import sentences
 from fitmat.match.ablation import Ablation, ablate
 from fitmat.match.discernibility import Telling, tell_apart
-from fitmat.match.distances import ANGLES, Distances, Values, measure_distances
+from fitmat.match.distances import ANGLES, Distances, PairedDraws, measure_distances
 from fitmat.match.imitation import Imitation, imitate
 from fitmat.match.sentences import CLOSE as CLOSE
 from fitmat.match.sentences import SIMILAR as SIMILAR
@@ -175,13 +174,13 @@ def compare(one: Posterior, other: Posterior, *, spheres: bool = True) -> Compar
     empirical, microfacet = (one, other) if is_empirical(one.fit.name) else (other, one)
     _refuse_unlike(empirical, microfacet)
     fits, models = (empirical.fit, microfacet.fit), (empirical.fit.model, microfacet.fit.model)
-    values = _paired(empirical, microfacet)
-    few = values[0][: FEW_DRAWS + 1], values[1][: FEW_DRAWS + 1]
+    draws = _paired(empirical, microfacet)
+    few = draws[0][: FEW_DRAWS + 1], draws[1][: FEW_DRAWS + 1]
     with ThreadPoolExecutor() as pool:
-        measuring = pool.submit(measure_distances, *models, values=values, measured=_incidences(fits[0].measurements))
-        ablating = pool.submit(ablate, *models, values=few)
-        telling = pool.submit(tell_apart, *fits, values=few)
-        seeing = pool.submit(_perceived, *fits, values=values) if spheres else None
+        measuring = pool.submit(measure_distances, *models, draws=draws, measured=_incidences(fits[0].measurements))
+        ablating = pool.submit(ablate, *models, draws=few)
+        telling = pool.submit(tell_apart, *fits, draws=few)
+        seeing = pool.submit(_perceived, *fits, draws=draws) if spheres else None
     parts = {"ablation": ablating.result(), "telling": telling.result(), "perceived": seeing and seeing.result()}
     return _concluded((empirical, microfacet), measuring.result(), **parts)
 
@@ -231,14 +230,13 @@ def _concluded(pair: tuple[Posterior, Posterior], found: Distances, **parts: Any
     )
 
 
-def _perceived(empirical: Fit, microfacet: Fit, values: Values) -> "Perceived":
+def _perceived(empirical: Fit, microfacet: Fit, draws: PairedDraws) -> "Perceived":
     from fitmat.match.appearance.spheres import perceived  # loads colour-science
 
-    vectors = jnp.asarray(values[0]), jnp.asarray(values[1])
-    return perceived(empirical.model, microfacet.model, vectors, empirical.measurements.channels)
+    return perceived(empirical.model, microfacet.model, draws, empirical.measurements.channels)
 
 
-def _paired(empirical: Posterior, microfacet: Posterior) -> Values:
+def _paired(empirical: Posterior, microfacet: Posterior) -> PairedDraws:
     """Parameter vectors of both: the best fits, then draws in pairs, in no particular order."""
     one, other = _by_scale(empirical), _by_scale(microfacet)
     mixed = np.random.default_rng(0).permutation(min(len(one), len(other)))

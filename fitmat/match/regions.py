@@ -3,17 +3,14 @@
 Integrates nothing and knows no model.
 """
 
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from fitmat._types import Directions, Scalar, Vec3
+from fitmat.maths.quadrature import gauss
+from fitmat.models.metrics import NGAN_DEG
 
 GRAZING_DEG = 70.0
 """Either direction beyond this zenith angle makes a pair grazing, whatever its half vector."""
-
-NGAN_DEG = 80.0
-"""Ngan et al. 2005 drop what lies beyond, in θ_i or θ_o."""
 
 CORE, TAIL = 1.0, 5.0
 """Slopes tan θ_h, in widths of the lobe, up to which a pair is core, and tail."""
@@ -40,7 +37,7 @@ PANEL_NODES = (4, 4, 12)
 """Gauss nodes in cosθ_i beyond `NGAN_DEG`, from there to `GRAZING_DEG`, and above."""
 
 
-def memberships(wi: Vec3, wo: Directions, width: Scalar) -> Float[Array, "m 4"]:
+def memberships(wi: Float[np.ndarray, "3"], wo: Float[np.ndarray, "m 3"], width: float) -> Float[np.ndarray, "m 4"]:
     """How far a pair of directions belongs to each region, 0 to 1; columns in the order of `REGIONS`, rows sum to 1.
 
     Args:
@@ -49,11 +46,11 @@ def memberships(wi: Vec3, wo: Directions, width: Scalar) -> Float[Array, "m 4"]:
         width: Slope-like width of the lobe, in (0, 1].
     """
     h = wi + wo
-    slope = jnp.hypot(h[:, 0], h[:, 1]) / jnp.maximum(width * h[:, 2], 1e-300)
+    slope = np.hypot(h[:, 0], h[:, 1]) / np.maximum(width * h[:, 2], 1e-300)
     edge, ramp = np.cos(np.deg2rad(GRAZING_DEG)), SOFT_DEG * np.pi / 180.0 * np.sin(np.deg2rad(GRAZING_DEG))
-    steep = jnp.clip(0.5 + (wo[:, 2] - edge) / ramp, 0.0, 1.0) * (wi[2] >= edge)
-    core, near = (jnp.clip(0.5 + (limit - slope) / (SOFT * limit), 0.0, 1.0) for limit in (CORE, TAIL))
-    return jnp.stack([steep * core, steep * (near - core), 1.0 - steep, steep * (1.0 - near)], axis=1)
+    steep = np.clip(0.5 + (wo[:, 2] - edge) / ramp, 0.0, 1.0) * (wi[2] >= edge)
+    core, near = (np.clip(0.5 + (limit - slope) / (SOFT * limit), 0.0, 1.0) for limit in (CORE, TAIL))
+    return np.stack([steep * core, steep * (near - core), 1.0 - steep, steep * (1.0 - near)], axis=1)
 
 
 def incidence_panels() -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
@@ -65,7 +62,7 @@ def incidence_panels() -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]
     edges = [0.0, *np.cos(np.deg2rad([NGAN_DEG, GRAZING_DEG])), 1.0]
     cosines, weights = [], []
     for low, high, count in zip(edges[:-1], edges[1:], PANEL_NODES, strict=True):
-        nodes, gauss = np.polynomial.legendre.leggauss(count)
+        nodes, shares = gauss(count)
         cosines.append(low + (high - low) * (nodes + 1) / 2)
-        weights.append(np.pi * (high - low) * gauss)
+        weights.append(np.pi * (high - low) * shares)
     return np.arccos(np.concatenate(cosines)), np.concatenate(weights)

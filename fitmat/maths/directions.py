@@ -18,13 +18,14 @@ numbers               float64
 Nothing here knows about reflectance.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from fitmat._types import Scalar, Vec3
+from fitmat.maths.arrays import library
 
 COS_MIN = 1e-7
 """Cosines are floored here where a formula divides by them; an angle of 6·10⁻⁶ degrees from grazing."""
@@ -95,10 +96,11 @@ def pair(wi: Vec3, wo: Vec3) -> Pair:
     return Pair(wi, wo, half_vector(wi, wo), cos_difference(wi, wo))
 
 
-def rotated(w: Vec3, angle: Scalar) -> Vec3:
+def rotated(w: Float[Any, "3"], angle: Float[Any, ""]) -> Float[Any, "3"]:
     """A direction turned by `angle` (radians, counter-clockwise seen from above) about the normal."""
-    sin, cos = jnp.sin(angle), jnp.cos(angle)
-    return jnp.stack([cos * w[0] - sin * w[1], sin * w[0] + cos * w[1], w[2]])
+    xp = library(w, angle)
+    sin, cos = xp.sin(angle), xp.cos(angle)
+    return xp.stack([cos * w[0] - sin * w[1], sin * w[0] + cos * w[1], w[2]])
 
 
 def mirror(direction: Vec3) -> Vec3:

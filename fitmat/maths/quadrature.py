@@ -3,7 +3,9 @@
 Knows no model.
 """
 
+import functools
 from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -11,7 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat._types import Directions, Scalar, Vec3
+from fitmat._types import Scalar
+from fitmat.maths.arrays import library
 from fitmat.maths.directions import rotated
 
 ZENITH_NODES = 64
@@ -32,9 +35,9 @@ class Rule(eqx.Module):
         weight: Weights with the cosine c_o and the solid angle, (m,); 0 below the horizon.
     """
 
-    wi: Vec3
-    wo: Directions
-    weight: Float[Array, " m"]
+    wi: Float[Any, "3"]
+    wo: Float[Any, "m 3"]
+    weight: Float[Any, " m"]
 
 
 class Facets(eqx.Module):
@@ -46,21 +49,28 @@ class Facets(eqx.Module):
         solid: Solid angles in sr, (m,).
     """
 
-    wi: Vec3
-    h: Directions
-    solid: Float[Array, " m"]
+    wi: Float[Any, "3"]
+    h: Float[Any, "m 3"]
+    solid: Float[Any, " m"]
 
 
-def incidence(theta_i: Scalar) -> Vec3:
+def incidence(theta_i: Float[Any, ""]) -> Float[Any, "3"]:
     """The unit vector to the light at zenith angle theta_i (radians), azimuth 0."""
-    return jnp.stack([jnp.sin(theta_i), 0.0 * theta_i, jnp.cos(theta_i)])
+    xp = library(theta_i)
+    return xp.stack([xp.sin(theta_i), 0.0 * theta_i, xp.cos(theta_i)])
+
+
+@functools.lru_cache
+def gauss(count: int) -> tuple[Float[np.ndarray, " count"], Float[np.ndarray, " count"]]:
+    """Nodes and weights of Gauss–Legendre on [−1, 1]."""
+    return np.polynomial.legendre.leggauss(count)
 
 
 def facets(
-    theta_i: Scalar,
-    width: Scalar,
+    theta_i: Float[Any, ""],
+    width: Float[Any, ""],
     *,
-    phi_i: Scalar | None = None,
+    phi_i: Float[Any, ""] | None = None,
     nodes: tuple[int, int] = (ZENITH_NODES, AZIMUTH_NODES),
 ) -> Facets:
     """A product rule over the micro-normals that face the light, dense around n on the scale of `width`.
@@ -69,26 +79,28 @@ def facets(
     under differentiation: the slope of an integral is the integral of the slope.
 
     Args:
-        theta_i: Incidence in radians.
+        theta_i: Incidence in radians; where this and the rest are plain numbers, NumPy computes.
         width: Slope-like width of the narrowest lobe.
         phi_i: Azimuth of incidence in radians; None for integrands that are the same on both sides of the plane of
             incidence: then the light comes from azimuth 0 and one side is taken, doubled.
         nodes: How many in zenith, and in azimuth on each side.
     """
-    x, weights = np.polynomial.legendre.leggauss(nodes[0])
-    t, scale = jnp.asarray((x + 1) / 2), _SPREAD * width
-    reach = jnp.arcsinh(jnp.pi / 2 / scale)
-    theta_h = (scale * jnp.sinh(t * reach))[:, None]
-    d_theta = (weights / 2 * scale * jnp.cosh(t * reach) * reach)[:, None]
-    y, ring = np.polynomial.legendre.leggauss(nodes[1] if phi_i is None else 2 * nodes[1])
-    edge = jnp.arccos(jnp.clip(-jnp.cos(theta_i) / jnp.maximum(jnp.sin(theta_i) * jnp.tan(theta_h), 1e-300), -1, 1))
-    phi = edge * jnp.asarray((y + 1) / 2 if phi_i is None else y)
-    solid = d_theta * jnp.sin(theta_h) * edge * jnp.asarray(ring)
+    xp = library(theta_i, width, *(() if phi_i is None else (phi_i,)))
+    x, weights = gauss(nodes[0])
+    t, scale = (x + 1) / 2, _SPREAD * width
+    reach = xp.arcsinh(np.pi / 2 / scale)
+    theta_h = (scale * xp.sinh(t * reach))[:, None]
+    d_theta = (weights / 2 * scale * xp.cosh(t * reach) * reach)[:, None]
+    y, ring = gauss(nodes[1] if phi_i is None else 2 * nodes[1])
+    edge = xp.arccos(xp.clip(-xp.cos(theta_i) / xp.maximum(xp.sin(theta_i) * xp.tan(theta_h), 1e-300), -1, 1))
+    phi = edge * ((y + 1) / 2 if phi_i is None else y)
+    solid = d_theta * xp.sin(theta_h) * edge * ring
     wi = incidence(theta_i)
-    h = jnp.stack([jnp.sin(theta_h) * jnp.cos(phi), jnp.sin(theta_h) * jnp.sin(phi), jnp.cos(theta_h) + 0.0 * phi])
+    h = xp.stack([xp.sin(theta_h) * xp.cos(phi), xp.sin(theta_h) * xp.sin(phi), xp.cos(theta_h) + 0.0 * phi])
     if phi_i is not None:
         wi, h = rotated(wi, phi_i), rotated(h, phi_i)
-    return jax.lax.stop_gradient(Facets(wi, h.reshape(3, -1).T, jnp.ravel(solid)))
+    found = Facets(wi, h.reshape(3, -1).T, xp.ravel(solid))
+    return found if xp is np else jax.lax.stop_gradient(found)
 
 
 def reflected(normals: Facets) -> Rule:
@@ -96,15 +108,15 @@ def reflected(normals: Facets) -> Rule:
     wi = normals.wi
     cos_d = normals.h @ wi
     wo = 2.0 * cos_d[:, None] * normals.h - wi
-    weight = jnp.where((cos_d > 0) & (wo[:, 2] > 0), 4.0 * cos_d * normals.solid * wo[:, 2], 0.0)
+    weight = library(cos_d).where((cos_d > 0) & (wo[:, 2] > 0), 4.0 * cos_d * normals.solid * wo[:, 2], 0.0)
     return Rule(wi, wo, weight)
 
 
 def lobe_rule(
-    theta_i: Scalar,
-    width: Scalar,
+    theta_i: Float[Any, ""],
+    width: Float[Any, ""],
     *,
-    phi_i: Scalar | None = None,
+    phi_i: Float[Any, ""] | None = None,
     nodes: tuple[int, int] = (ZENITH_NODES, AZIMUTH_NODES),
 ) -> Rule:
     """A rule over ω_o that resolves lobes of a given width around the mirror direction; arguments as in `facets`."""
@@ -116,7 +128,7 @@ def incidence_rule() -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
 
     Divided by cosθ_i the weights integrate over solid angle.
     """
-    nodes, weights = np.polynomial.legendre.leggauss(INCIDENCE_NODES)
+    nodes, weights = gauss(INCIDENCE_NODES)
     cos = (nodes + 1) / 2
     return np.arccos(cos), np.pi * weights * cos
 
@@ -161,7 +173,7 @@ def _chebyshev() -> tuple[np.ndarray, np.ndarray]:
 
 def _gauss() -> tuple[np.ndarray, np.ndarray]:
     """Cosines and shares of `cosine_mean`: c = x², 2c dc = 4x³ dx."""
-    x, weights = np.polynomial.legendre.leggauss(2 * CURVE_NODES)
+    x, weights = gauss(2 * CURVE_NODES)
     root = (x + 1) / 2
     return root**2, 2.0 * root**3 * weights
 

@@ -8,14 +8,13 @@ one after the other. The sphere casts no shadow on itself and no light is reflec
 with its x axis along the parallels about the vertical axis y, as if turned on a lathe.
 """
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
-import numpy as np
-from jaxtyping import Array, Float
+import dataclasses
 
-from fitmat._types import Directions, Scalar
-from fitmat.maths.quadrature import facets, lobe_rule
+import numpy as np
+from jaxtyping import Float
+
+from fitmat.maths.directions import zenith
+from fitmat.maths.quadrature import Rule, facets, gauss, lobe_rule
 
 LIGHTS = {"front light": (20.0, 120.0), "side light": (60.0, 150.0), "rim light": (140.0, 45.0)}
 """Name → angle from the viewer and direction on the screen (counter-clockwise from the right), degrees."""
@@ -41,7 +40,8 @@ GRAZING = 0.052336
 """cos 87°: pixels are left out where a light falls or the viewer looks at a flatter angle than 3°."""
 
 
-class Screen(eqx.Module):
+@dataclasses.dataclass(frozen=True, eq=False)
+class Screen:
     """Pixels of the sphere, on rings about some normal, on one side of its meridian and then on the other.
 
     Attributes:
@@ -53,22 +53,22 @@ class Screen(eqx.Module):
             sides look the same.
     """
 
-    axes: Float[Array, "3 3"]
-    half: Scalar
-    rings: Float[Array, " a"]
-    along: Float[Array, " b"]
-    area: Float[Array, "a s b"]
+    axes: Float[np.ndarray, "3 3"]
+    half: float
+    rings: Float[np.ndarray, " a"]
+    along: Float[np.ndarray, " b"]
+    area: Float[np.ndarray, "a s b"]
 
     @property
-    def normals(self) -> Float[Array, "a s b 3"]:
+    def normals(self) -> Float[np.ndarray, "a s b 3"]:
         """Of the pixels, in the viewer's axes."""
-        turn = jnp.pi / 2.0 + reach(self.rings, self.half)[:, None] * self.along
-        turn, rings = jnp.stack([turn, -turn][: self.area.shape[1]], axis=1), self.rings[:, None, None]
-        sin = jnp.sin(rings)
-        return jnp.stack([sin * jnp.cos(turn), sin * jnp.sin(turn), jnp.cos(rings + 0.0 * turn)], axis=-1) @ self.axes
+        turn = np.pi / 2.0 + reach(self.rings, self.half)[:, None] * self.along
+        turn, rings = np.stack([turn, -turn][: self.area.shape[1]], axis=1), self.rings[:, None, None]
+        sin = np.sin(rings)
+        return np.stack([sin * np.cos(turn), sin * np.sin(turn), np.cos(rings + 0.0 * turn)], axis=-1) @ self.axes
 
 
-def reach(theta: Float[Array, "..."], half: Scalar) -> Float[Array, "..."]:
+def reach(theta: Float[np.ndarray, "..."], half: float) -> Float[np.ndarray, "..."]:
     """How far a ring can be seen and lit on either side of azimuth ±90°: at most π/2, which is everywhere.
 
     The viewer is at zenith angle `half` and azimuth 0, the light at azimuth 180°: c_o = c_θ c_h + s_θ s_h cos φ and
@@ -78,11 +78,12 @@ def reach(theta: Float[Array, "..."], half: Scalar) -> Float[Array, "..."]:
         theta: Angle of the ring, radians.
         half: Half the angle between viewer and light, radians.
     """
-    most = (jnp.cos(theta) * jnp.cos(half) - GRAZING) / jnp.maximum(jnp.sin(theta) * jnp.sin(half), 1e-300)
-    return jnp.arcsin(jnp.clip(most, 0.0, 1.0))
+    most = (np.cos(theta) * np.cos(half) - GRAZING) / np.maximum(np.sin(theta) * np.sin(half), 1e-300)
+    return np.arcsin(np.clip(most, 0.0, 1.0))
 
 
-class Lit(eqx.Module):
+@dataclasses.dataclass(frozen=True, eq=False)
+class Lit:
     """Pixels under light of one direction, L = f c_i.
 
     Attributes:
@@ -92,11 +93,12 @@ class Lit(eqx.Module):
     """
 
     screen: Screen
-    wi: Directions
-    wo: Directions
+    wi: Float[np.ndarray, "m 3"]
+    wo: Float[np.ndarray, "m 3"]
 
 
-class Surrounded(eqx.Module):
+@dataclasses.dataclass(frozen=True, eq=False)
+class Surrounded:
     """Pixels in the environment, L = Σ_k light f: s pairs of directions each serve j pixels, m = s j.
 
     Attributes:
@@ -107,46 +109,45 @@ class Surrounded(eqx.Module):
     """
 
     screen: Screen
-    wi: Float[Array, "s k 3"]
-    wo: Float[Array, "s k 3"]
-    light: Float[Array, "s j k"]
+    wi: Float[np.ndarray, "s k 3"]
+    wo: Float[np.ndarray, "s k 3"]
+    light: Float[np.ndarray, "s j k"]
 
 
-def radiance(w: Float[Array, "... 3"]) -> Float[Array, "..."]:
+def radiance(w: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "..."]:
     """L_e of the environment from direction w (viewer's axes): overcast sky, ground, and two soft windows.
 
     Sky: (1 + 2 sin γ)/3 at the elevation γ over the horizontal plane y = 0 (Moon & Spencer 1942; the CIE standard
     overcast sky). Windows: L exp(κ(w·c − 1)), 6° in standard deviation.
     """
     up = w[..., 1]
-    total = jnp.where(up > 0.0, (1.0 + 2.0 * up) / 3.0, GROUND)
+    total = np.where(up > 0.0, (1.0 + 2.0 * up) / 3.0, GROUND)
     for angle, azimuth, sharpness, brightness in WINDOWS:
-        centre = frame(*(jnp.deg2rad(jnp.asarray(part)) for part in (angle, azimuth)))[2]
-        total += brightness * jnp.exp(sharpness * (w @ centre - 1.0))
+        centre = frame(np.deg2rad(angle), np.deg2rad(azimuth))[2]
+        total += brightness * np.exp(sharpness * (w @ centre - 1.0))
     return total
 
 
-def frame(theta: Scalar, azimuth: Scalar) -> Float[Array, "3 3"]:
+def frame(theta: float, azimuth: float) -> Float[np.ndarray, "3 3"]:
     """Rows: two tangents and the normal, theta away from the viewer, who has azimuth 0 in it.
 
     Args:
         theta: Angle of the normal from the viewer, radians.
         azimuth: Direction of the normal on the screen, radians.
     """
-    sin, cos, across, along = jnp.sin(theta), jnp.cos(theta), jnp.sin(azimuth), jnp.cos(azimuth)
-    rows = (-cos * along, -cos * across, sin), (across, -along, 0.0 * cos), (sin * along, sin * across, cos)
-    return jnp.stack([jnp.stack(row) for row in rows])
+    sin, cos, across, along = np.sin(theta), np.cos(theta), np.sin(azimuth), np.cos(azimuth)
+    return np.array([[-cos * along, -cos * across, sin], [across, -along, 0.0], [sin * along, sin * across, cos]])
 
 
-def tangents(normal: Float[Array, "3"]) -> Float[Array, "3 3"]:
+def tangents(normals: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, "m 3 3"]:
     """Rows: the tangent along the parallel about the vertical axis y, the one along the meridian, and the normal."""
-    x, y, z = normal
-    across = jnp.sqrt(jnp.maximum(x * x + z * z, 1e-24))
-    along = jnp.stack([z, 0.0 * y, -x]) / across
-    return jnp.stack([along, jnp.cross(normal, along), normal])
+    x, y, z = normals.T
+    across = np.sqrt(np.maximum(x * x + z * z, 1e-24))
+    along = np.stack([z, 0.0 * y, -x], axis=1) / across[:, None]
+    return np.stack([along, np.cross(normals, along), normals], axis=1)
 
 
-def lit(width: Scalar, angle: float, azimuth: float, *, isotropic: bool) -> Lit:
+def lit(width: float, angle: float, azimuth: float, *, isotropic: bool) -> Lit:
     """Pixels that crowd around the normal that mirrors the light to the viewer, on the scale of the lobe's width.
 
     The rings are those of `quadrature.facets`, the micro-normals taken for normals of the sphere: a highlight is seen
@@ -159,20 +160,19 @@ def lit(width: Scalar, angle: float, azimuth: float, *, isotropic: bool) -> Lit:
         isotropic: Whether both models are, so that one side of the plane of light and viewer is enough.
     """
     sides = 1 if isotropic else 2
-    half, turn = jnp.deg2rad(jnp.asarray(angle / 2.0)), jnp.deg2rad(jnp.asarray(azimuth))
-    spots = facets(jnp.zeros(()), width, nodes=(LIGHT_RINGS, 1))
-    rings = jnp.arctan2(jnp.hypot(spots.h[:, 0], spots.h[:, 1]), spots.h[:, 2])
-    along, shares = (jnp.asarray(part) for part in np.polynomial.legendre.leggauss(LIGHT_PIXELS))
-    solid = (spots.solid / (sides * jnp.pi) * reach(rings, half))[:, None, None] * shares
-    screen = Screen(frame(half, turn), half, rings, along, jnp.broadcast_to(solid, (LIGHT_RINGS, sides, LIGHT_PIXELS)))
-    normals = screen.normals.reshape(-1, 3)
-    surface = jax.vmap(tangents)(normals)
-    area = screen.area * jnp.maximum(normals[:, 2].reshape(screen.area.shape), 0.0)
-    screen = eqx.tree_at(lambda part: part.area, screen, area)
+    half, turn = np.deg2rad(angle / 2.0), np.deg2rad(azimuth)
+    spots = facets(0.0, width, nodes=(LIGHT_RINGS, 1))
+    rings = zenith(spots.h)
+    along, shares = gauss(LIGHT_PIXELS)
+    solid = (spots.solid / (sides * np.pi) * reach(rings, half))[:, None, None] * shares
+    solid = np.broadcast_to(solid, (LIGHT_RINGS, sides, LIGHT_PIXELS))
+    screen = Screen(frame(half, turn), half, rings, along, solid)
+    surface = tangents(screen.normals.reshape(-1, 3))
+    screen = dataclasses.replace(screen, area=solid * np.maximum(screen.normals[..., 2], 0.0))
     return Lit(screen, surface @ frame(2.0 * half, turn)[2], surface[:, :, 2])
 
 
-def surrounded(width: Scalar, *, isotropic: bool) -> Surrounded:
+def surrounded(width: float, *, isotropic: bool) -> Surrounded:
     """Rings of pixels with a rule over the light that is dense around each pixel's mirror direction.
 
     The rule of `quadrature.lobe_rule` around the viewer gives the directions to the light. The models of isotropic
@@ -183,21 +183,28 @@ def surrounded(width: Scalar, *, isotropic: bool) -> Surrounded:
         isotropic: Whether both models are.
     """
     count, pixels = (SKY_RINGS, SKY_PIXELS) if isotropic else (COARSE_RINGS, COARSE_PIXELS)
-    nodes, weights = np.polynomial.legendre.leggauss(count)
+    nodes, weights = gauss(count)
     square = 1.0 - GRAZING**2
-    rings, along = jnp.arcsin(jnp.sqrt(square * (nodes + 1.0) / 2.0)), (2.0 * jnp.arange(pixels) + 1.0) / pixels - 1.0
+    rings, along = np.arcsin(np.sqrt(square * (nodes + 1.0) / 2.0)), (2.0 * np.arange(pixels) + 1.0) / pixels - 1.0
     area = np.pi * square * weights[:, None, None] / (4.0 * pixels) * np.ones((2, pixels))
-    screen = Screen(jnp.eye(3), jnp.zeros(()), rings, along, jnp.asarray(area))
+    screen = Screen(np.eye(3), 0.0, rings, along, area)
     normals = screen.normals.reshape(-1, 3)
     if isotropic:
-        rule = jax.vmap(lambda t: lobe_rule(t, width, nodes=SKY_NODES))(rings)
-        turns = jnp.arctan2(normals[:, 1], normals[:, 0]).reshape(count, -1)
-        surface = jax.vmap(lambda t, every: jax.vmap(lambda turn: frame(t, turn))(every))(rings, turns)
-        sides = rule.wo[:, None], (rule.wo * jnp.array([1.0, -1.0, 1.0]))[:, None]
-        light = sum(radiance(side @ surface) for side in sides) / 2.0 * rule.weight[:, None]
+        rules = [lobe_rule(ring, width, nodes=SKY_NODES) for ring in rings]
+        turns = np.arctan2(normals[:, 1], normals[:, 0]).reshape(count, -1)
+        light = np.stack([_both_sides(*each) for each in zip(rules, rings, turns, strict=True)])
     else:
-        surface = jax.vmap(tangents)(normals)
-        turns, each = jnp.arctan2(surface[:, 1, 2], surface[:, 0, 2]), jnp.repeat(rings, 2 * pixels)
-        rule = jax.vmap(lambda t, turn: lobe_rule(t, width, phi_i=turn, nodes=COARSE_NODES))(each, turns)
-        light = (radiance(rule.wo @ surface) * rule.weight)[:, None]
-    return Surrounded(screen, rule.wo, jnp.broadcast_to(rule.wi[:, None], rule.wo.shape), light)
+        surface = tangents(normals)
+        turns, each = np.arctan2(surface[:, 1, 2], surface[:, 0, 2]), np.repeat(rings, 2 * pixels)
+        rules = [lobe_rule(t, width, phi_i=turn, nodes=COARSE_NODES) for t, turn in zip(each, turns, strict=True)]
+        seen = zip(rules, surface, strict=True)
+        light = np.stack([(radiance(rule.wo @ axes) * rule.weight)[None] for rule, axes in seen])
+    wi, wo = np.stack([rule.wi for rule in rules]), np.stack([rule.wo for rule in rules])
+    return Surrounded(screen, wo, np.broadcast_to(wi[:, None], wo.shape), light)
+
+
+def _both_sides(rule: Rule, ring: float, turns: Float[np.ndarray, " j"]) -> Float[np.ndarray, "j k"]:
+    """The light that pixels of one ring see at the nodes of a rule, those of both sides averaged, with its weight."""
+    surface = np.stack([frame(ring, turn) for turn in turns])
+    sides = radiance(rule.wo @ surface), radiance(rule.wo * [1.0, -1.0, 1.0] @ surface)
+    return (sides[0] + sides[1]) / 2.0 * rule.weight

@@ -9,21 +9,17 @@ the same camera.
 
 import dataclasses
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 from scipy.ndimage import map_coordinates
 
-from fitmat.fitting.likelihood import mapped
 from fitmat.match.appearance import scene
 from fitmat.match.appearance.colour import colouring, delta_e_2000, delta_e_itp, shown, to_srgb
 from fitmat.match.appearance.scene import Screen
+from fitmat.match.distances import PairedDraws
 from fitmat.maths.directions import zenith
-from fitmat.models.around.shown import surface
-from fitmat.models.base import AbstractBRDF, evaluate_pairs
-from fitmat.models.parameters import with_vector
+from fitmat.models.base import AbstractBRDF
+from fitmat.models.values import Draws, blocks, surfaces, values, widths
 from fitmat.uncertainty.estimate import Estimate, estimate
 
 DRAWS = 40
@@ -119,7 +115,7 @@ class Perceived:
 
 
 def perceived(
-    empirical: AbstractBRDF, microfacet: AbstractBRDF, draws: tuple[Array, Array], channels: tuple[str, ...]
+    empirical: AbstractBRDF, microfacet: AbstractBRDF, draws: PairedDraws, channels: tuple[str, ...]
 ) -> Perceived:
     """Both models' spheres in every light, and what an eye sees of their difference.
 
@@ -136,25 +132,22 @@ def perceived(
 
     Example:
         >>> import fitmat as fm
-        >>> from fitmat.models.parameters import vector
+        >>> from fitmat.models.values import numbers
         >>> one, other = fm.model("lambert+phong", kd=0.3), fm.model("lambert+ggx", kd=0.3)
-        >>> found = perceived(one, other, (vector(one)[None], vector(other)[None]), ("value",))
+        >>> found = perceived(one, other, (numbers(one)[None], numbers(other)[None]), ("value",))
         >>> found.colours
         'one channel, drawn grey'
     """
     colours, count = colouring(channels), len(draws[0])
     used = np.unique(np.r_[0, np.linspace(min(1, count - 1), count - 1, min(DRAWS, count)).round().astype(int)])
-    pairs = jnp.asarray(draws[0])[used], jnp.asarray(draws[1])[used]
-    screens, computed = _rendered(empirical, microfacet, pairs, jnp.asarray(colours.weights))
+    pair = surfaces(empirical, draws[0][used]), surfaces(microfacet, draws[1][used])
+    screens, computed = _rendered(pair, colours.weights)
     names = [*scene.LIGHTS, scene.ENVIRONMENT]
-    found = [
-        _lighting(name, jax.tree.map(np.asarray, screen), np.asarray(xyz))
-        for name, screen, xyz in zip(names, screens, computed, strict=True)
-    ]
+    found = [_lighting(name, screen, xyz) for name, screen, xyz in zip(names, screens, computed, strict=True)]
     every = [np.concatenate([deltas[k] for _, deltas, _ in found], axis=1) for k in range(2)]
     shares = np.concatenate([share for _, _, share in found])
     return Perceived(
-        names=(surface(empirical).name, surface(microfacet).name),
+        names=(pair[0][0].name, pair[1][0].name),
         lightings=tuple(lighting for lighting, _, _ in found),
         delta_e_2000=_spread(every[0], shares),
         delta_e_itp=_spread(every[1], shares),
@@ -162,36 +155,35 @@ def perceived(
     )
 
 
-@eqx.filter_jit
 def _rendered(
-    empirical: AbstractBRDF, microfacet: AbstractBRDF, values: tuple[Array, Array], weights: Float[Array, "c 3"]
-) -> tuple[list[Screen], list[Float[Array, "d 2 m 3"]]]:
+    pair: tuple[Draws, Draws], weights: Float[np.ndarray, "c 3"]
+) -> tuple[list[Screen], list[Float[np.ndarray, "d 2 m 3"]]]:
     """The pixels of each lighting, and XYZ radiances there of both models for d pairs of draws."""
-
-    def models(pair: Array) -> list[AbstractBRDF]:
-        parts = jnp.split(pair, [values[0].shape[1]])
-        return [surface(with_vector(f, v)) for f, v in zip((empirical, microfacet), parts, strict=True)]
-
-    pairs = jnp.concatenate(values, axis=1)
-    width = jnp.min(jax.vmap(lambda pair: jnp.stack([f.width() for f in models(pair)]))(pairs))
-    isotropic = all(surface(f).isotropic for f in (empirical, microfacet))
+    width = float(min(widths(*part).min() for part in pair))
+    isotropic = all(model.isotropic for model, _ in pair)
     spots = [scene.lit(width, *where, isotropic=isotropic) for where in scene.LIGHTS.values()]
     around = scene.surrounded(width, isotropic=isotropic)
-    wi = jnp.concatenate([*(spot.wi for spot in spots), around.wi.reshape(-1, 3)])
-    wo = jnp.concatenate([*(spot.wo for spot in spots), around.wo.reshape(-1, 3)])
-    ends = np.cumsum([len(spot.wi) for spot in spots])
+    found = [np.stack([_lit(part, spot, weights) for part in pair], axis=1) for spot in spots]
+    sky = np.stack([_surrounded(part, around, weights) for part in pair], axis=1)
+    return [*(spot.screen for spot in spots), around.screen], [*found, sky]
 
-    def seen(model: AbstractBRDF) -> list[Array]:
-        f = evaluate_pairs(model, wi, wo)
-        xyz = jnp.broadcast_to(f, (len(f), len(weights))) @ weights
-        *direct, rest = jnp.split(xyz, ends)
-        sky = around.light @ rest.reshape(*around.wi.shape[:2], 3)
-        return [*(x * spot.wi[:, 2:] for x, spot in zip(direct, spots, strict=True)), sky.reshape(-1, 3)]
 
-    def both(pair: Array) -> list[Array]:
-        return [jnp.stack(parts) for parts in zip(*map(seen, models(pair)), strict=True)]
+def _lit(part: Draws, spot: scene.Lit, weights: Float[np.ndarray, "c 3"]) -> Float[np.ndarray, "d m 3"]:
+    """XYZ radiances of every draw in a light of one direction."""
+    return _coloured(values(*part, spot.wi, spot.wo), weights) * spot.wi[:, 2:]
 
-    return [*(spot.screen for spot in spots), around.screen], mapped(both, pairs)
+
+def _surrounded(part: Draws, around: scene.Surrounded, weights: Float[np.ndarray, "c 3"]) -> Float[np.ndarray, "d m 3"]:
+    """XYZ radiances of every draw in the environment."""
+    found = np.zeros((len(part[1]), *around.light.shape[:2], 3))
+    for rows, k, (f,) in blocks([part], list(zip(around.wi, around.wo, strict=True))):
+        found[rows, k] = around.light[k] @ _coloured(f, weights)
+    return found.reshape(len(found), -1, 3)
+
+
+def _coloured(f: Float[np.ndarray, "d m c"], weights: Float[np.ndarray, "c 3"]) -> Float[np.ndarray, "d m 3"]:
+    """XYZ of values in the channels; of a model with one value for all where there are several."""
+    return np.broadcast_to(f, (*f.shape[:2], len(weights))) @ weights
 
 
 def _lighting(
@@ -235,7 +227,7 @@ def _pictures(screen: Screen, values: Float[np.ndarray, "m k"]) -> Float[np.ndar
     x, y = x[inside], y[inside]
     normals = np.stack([x, y, np.sqrt(1.0 - x * x - y * y)], axis=1) @ np.asarray(screen.axes).T
     theta, turn = zenith(normals), np.arctan2(normals[:, 1], normals[:, 0])
-    along = (np.abs(turn) - np.pi / 2) / np.maximum(np.asarray(scene.reach(jnp.asarray(theta), screen.half)), 1e-9)
+    along = (np.abs(turn) - np.pi / 2) / np.maximum(scene.reach(theta, screen.half), 1e-9)
     ends = np.asarray(screen.along)
     ends = np.r_[-2.0 - ends[0], ends, 2.0 - ends[-1]]  # the next pixel is on the other side of the meridian
     grid = values.reshape(*screen.area.shape, -1)

@@ -129,7 +129,7 @@ def test_tristimulus_values_are_taken_as_they_are() -> None:
 def test_the_colour_library_is_loaded_late_and_leaves_warnings_alone() -> None:
     code = """
 import sys, warnings
-from fitmat import spectra
+from fitmat.match.appearance import colour
 assert "colour" not in sys.modules
 before = list(warnings.filters)
 colour.colouring(("r", "g", "b"))

@@ -3,9 +3,6 @@
 import dataclasses
 from types import ModuleType
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from oracles import ggx
@@ -13,8 +10,8 @@ from oracles import ggx
 import fitmat as fm
 from fitmat.match.appearance import scene
 from fitmat.match.appearance.spheres import Perceived, Spread, _spread, perceived
-from fitmat.models.base import AbstractBRDF, evaluate_pairs
-from fitmat.models.parameters import vector
+from fitmat.models.base import AbstractBRDF, evaluate
+from fitmat.models.values import numbers
 from fitmat.reports import plot
 from fitmat.uncertainty.estimate import Estimate
 
@@ -45,14 +42,14 @@ ALPHA, ETA, KAPPA = 0.2, 1.5, 2.9
 
 def alone(one: AbstractBRDF, other: AbstractBRDF) -> Perceived:
     """Two models that are certain."""
-    return perceived(one, other, (vector(one)[None], vector(other)[None]), ("value",))
+    return perceived(one, other, (numbers(one)[None], numbers(other)[None]), ("value",))
 
 
 @pytest.fixture(scope="module")
 def greys() -> Perceived:
     """Albedos 0.3 ± 0.01 and 0.25, of which the draws know the first only."""
     one, other = fm.model("lambert", kd=0.3), fm.model("lambert", kd=0.25)
-    draws = jnp.array([[0.3], [0.29], [0.31], [0.3]]), jnp.full((4, 1), 0.25)
+    draws = np.array([[0.3], [0.29], [0.31], [0.3]]), np.full((4, 1), 0.25)
     return perceived(one, other, draws, ("value",))
 
 
@@ -123,7 +120,7 @@ def test_the_worst_twentieth_is_of_the_lit_area() -> None:
 def test_light_that_a_lambertian_sphere_sends_back(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """∫ c_i c_o dω over what is seen and lit = (2/3)(sin β + (π − β) cos β); its area on the screen π(1 + cos β)/2."""
     monkeypatch.setattr(scene, "GRAZING", 0.0)
-    spot = jax.jit(lambda width: scene.lit(width, *scene.LIGHTS[name], isotropic=True))(0.1)
+    spot = scene.lit(0.1, *scene.LIGHTS[name], isotropic=True)
     beta, area = np.deg2rad(scene.LIGHTS[name][0]), np.asarray(spot.screen.area).ravel()
     assert area.sum() == pytest.approx(np.pi * (1 + np.cos(beta)) / 2, rel=CORNERS)
     sent = area @ np.asarray(spot.wi)[:, 2]
@@ -134,7 +131,7 @@ def test_light_that_a_lambertian_sphere_sends_back(name: str, monkeypatch: pytes
 def test_pixels_see_the_light_and_the_viewer_where_they_are(isotropic: bool) -> None:
     """The angles at each normal, both axes of the tangent field, and the highlight's centre."""
     light = direction(60, 150)
-    spot = jax.jit(lambda width: scene.lit(width, 60.0, 150.0, isotropic=isotropic))(0.1)
+    spot = scene.lit(0.1, 60.0, 150.0, isotropic=isotropic)
     n = np.asarray(spot.screen.normals).reshape(-1, 3)
     parallel = np.stack([n[:, 2], 0 * n[:, 0], -n[:, 0]], axis=1)
     parallel /= np.linalg.norm(parallel, axis=1, keepdims=True)
@@ -147,7 +144,7 @@ def test_pixels_see_the_light_and_the_viewer_where_they_are(isotropic: bool) -> 
 
 def test_a_narrow_highlight_is_resolved() -> None:
     """∫ f c_i c_o dω of α = 0.001 in the side light, by midpoints in ln θ and φ about the mirroring normal."""
-    spot = jax.jit(lambda width: scene.lit(width, *scene.LIGHTS["side light"], isotropic=True))(0.001)
+    spot = scene.lit(0.001, *scene.LIGHTS["side light"], isotropic=True)
     f = fm.evaluate(fm.model("ggx", alpha=0.001, eta=ETA), spot.wi, spot.wo)[:, 0]
     found = np.asarray(spot.screen.area).ravel() @ (f * np.asarray(spot.wi)[:, 2])
     log, phi = np.linspace(np.log(1e-6), np.log(1.0), 4001), (np.arange(60) + 0.5) * np.pi / 60
@@ -165,12 +162,11 @@ def test_a_narrow_highlight_is_resolved() -> None:
     assert found == pytest.approx(np.sum(np.where(seen, radiance * ci * co * solid, 0.0)), rel=NARROW)
 
 
-@eqx.filter_jit
-def _sky(model: AbstractBRDF) -> tuple[scene.Surrounded, jax.Array, jax.Array]:
+def _sky(model: AbstractBRDF) -> tuple[scene.Surrounded, np.ndarray, np.ndarray]:
     """The environment's pixels, their radiance and their irradiance, (rings, pixels)."""
-    around = scene.surrounded(model.width(), isotropic=True)
-    f = evaluate_pairs(model, around.wi.reshape(-1, 3), around.wo.reshape(-1, 3)).reshape(around.wi.shape[:2])
-    return around, jnp.einsum("sjk,sk->sj", around.light, f), around.light.sum(axis=2)
+    around = scene.surrounded(float(model.width()), isotropic=True)
+    f = evaluate(model, around.wi.reshape(-1, 3), around.wo.reshape(-1, 3)).reshape(around.wi.shape[:2])
+    return around, np.einsum("sjk,sk->sj", around.light, f), around.light.sum(axis=2)
 
 
 def environment(w: np.ndarray) -> np.ndarray:
@@ -299,7 +295,7 @@ def test_the_sentence_follows_the_upper_end_of_the_interval(greys: Perceived, li
 
 
 def test_spheres_are_drawn_by_light_and_model(greys: Perceived) -> None:
-    figure = plot.plot_spheres(greys)
+    figure = plot.spheres(greys)
     pictures = [ax for ax in figure.axes if ax.images]
     assert len(pictures) == 12
     assert [ax.get_title() for ax in pictures[:4]] == [*scene.LIGHTS, scene.ENVIRONMENT]
