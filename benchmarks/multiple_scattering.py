@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 
 from fitmat.maths.directions import from_angles
 from fitmat.maths.quadrature import lobe_rule
-from fitmat.models.albedo import directional_albedo
+from fitmat.models.albedo import albedo
 from fitmat.models.base import AbstractBRDF, evaluate
 from fitmat.models.lobes.kulla_conty import KullaConty
 from fitmat.models.lobes.microfacet import Microfacet
@@ -85,7 +85,7 @@ def draw_albedo(ax: Axes, name: str, alpha: float, samples: int) -> None:
     """Directional albedo against the angle of incidence."""
     fine = np.deg2rad(np.linspace(0, 88, 45))
     for label, lobe in lobes(METALS[name], alpha).items():
-        ax.plot(np.rad2deg(fine), directional_albedo(lobe, fine).value[:, 0], color=COLOURS[label], label=label)
+        ax.plot(np.rad2deg(fine), albedo(lobe, fine).value[:, 0], color=COLOURS[label], label=label)
     rough, degrees = surface(METALS[name], alpha), np.arange(5.0, 86.0, 10.0)
     wi = from_angles(np.deg2rad(degrees), np.zeros(len(degrees)))
     walked = albedo_walk(rough, wi, samples=samples, seed=3).reflected

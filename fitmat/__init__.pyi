@@ -1,51 +1,49 @@
-from .errors import FitmatError as FitmatError
+# Measurements
+from .measurements.reader import read as read
+from .measurements.writing import write as write
+from .measurements.samples import from_arrays as from_arrays
+from .measurements.samples import Measurements as Measurements
+from .measurements.instrument import Instrument as Instrument
+from .judgement.examination.examining import examine as examine
+from .models.simulation import simulate as simulate
+
+# Models
+from .models.registry import model as model
+from .judgement.choice import every_model as every_model
+from .models.base import evaluate as evaluate
+from .models.albedo import albedo as albedo
+from .models.multiple_scattering.surface import Surface as Surface
+from .models.multiple_scattering.random_walk import evaluate_walk as evaluate_walk
+from .models.multiple_scattering.random_walk import albedo_walk as albedo_walk
+from .models.multiple_scattering.position_free import evaluate_slab as evaluate_slab
+
+# Fitting
 from .fitting.fitting import fit as fit
 from .fitting.result import Fit as Fit
-from .judgement.calibration import Calibration as Calibration
-from .judgement.calibration import calibrate as calibrate
-from .judgement.choice import Choice as Choice
-from .judgement.choice import choose as choose
-from .judgement.choice import every_model as every_model
-from .judgement.design.candidates import Limits as Limits
-from .judgement.design.design import Design as Design
-from .judgement.design.design import next_angles as next_angles
-from .judgement.examination.examining import Examination as Examination
-from .judgement.examination.examining import examine as examine
-from .judgement.identifiability.verdicts import Identifiability as Identifiability
-from .judgement.identifiability.verdicts import identify as identify
-from .judgement.prediction import sections as sections
-from .judgement.predictive_check import check_predictions as check_predictions
-from .match.imitation import imitate as imitate
-from .match.match import Comparison as Comparison
-from .match.match import compare as compare
-from .measurements.instrument import Instrument as Instrument
-from .measurements.reader import read as read
-from .measurements.samples import Measurements as Measurements
-from .measurements.samples import from_arrays as from_arrays
-from .measurements.writing import write as write
-from .models.albedo import directional_albedo as directional_albedo
-from .models.albedo import hemispherical_albedo as hemispherical_albedo
-from .models.base import evaluate as evaluate
-from .models.conversion import alpha_from_exponent as alpha_from_exponent
-from .models.conversion import exponent_from_alpha as exponent_from_alpha
-from .models.multiple_scattering.position_free import evaluate_slab as evaluate_slab
-from .models.multiple_scattering.random_walk import albedo_walk as albedo_walk
-from .models.multiple_scattering.random_walk import evaluate_walk as evaluate_walk
-from .models.multiple_scattering.surface import Surface as Surface
-from .models.registry import model as model
-from .models.simulation import simulate as simulate
-from .reports.examination_plots import plot_examination as plot_examination
-from .reports.plot import plot_ablation as plot_ablation
-from .reports.plot import plot_albedo as plot_albedo
-from .reports.plot import plot_choice as plot_choice
-from .reports.plot import plot_corner as plot_corner
-from .reports.plot import plot_design as plot_design
-from .reports.plot import plot_distances as plot_distances
-from .reports.plot import plot_left_out as plot_left_out
-from .reports.plot import plot_residuals as plot_residuals
-from .reports.plot import plot_section as plot_section
-from .reports.plot import plot_spheres as plot_spheres
-from .uncertainty.chains import sample as sample
+
+# Uncertainty
 from .uncertainty.laplace import laplace as laplace
+from .uncertainty.chains import sample as sample
 from .uncertainty.posterior import Posterior as Posterior
+
+# Judgement
+from .judgement.identifiability.verdicts import identify as identify
+from .judgement.choice import choose as choose
+from .judgement.predictive_check import check_predictions as check_predictions
 from .uncertainty.second_sampler import check_posterior as check_posterior
+from .judgement.calibration import calibrate as calibrate
+from .judgement.design.design import next_angles as next_angles
+
+# Match
+from .match.match import compare as compare
+from .match.match import Match as Match
+from .match.imitation import imitate as imitate
+
+# Study
+from .studies.study import study as study
+from .studies.study import Study as Study
+
+# Report
+from .reports.page import report as report
+from .reports import plot as plot
+from .errors import FitmatError as FitmatError

@@ -1,7 +1,9 @@
-"""Array shapes that recur, named once: n samples, c channels, p parameters, w walkers.
+"""Types that recur, named once; of arrays: n samples, c channels, p parameters, w walkers.
 
 Nothing here computes.
 """
+
+from collections.abc import Callable
 
 from jaxtyping import Array, Float
 
@@ -19,3 +21,6 @@ Spectrum = Float[Array, " c"]
 
 Samples = Float[Array, "n c"]
 """One value per sample and channel."""
+
+Progress = Callable[[str, int, int], None]
+"""Called with what is being done, how much of it is done, and how much is expected (0 while nobody knows)."""

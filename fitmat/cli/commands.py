@@ -80,22 +80,28 @@ def fit(
     _setup()
     from fitmat import files
     from fitmat.cli import session
-    from fitmat.fitting import known, priors
-    from fitmat.measurements.samples import Measurements
+    from fitmat.fitting import priors
     from fitmat.models.parameters import assignments
     from fitmat.reports import page, terminal
+    from fitmat.studies.study import study
 
     fixed, believed = assignments(fix or [], "--fix"), priors.assignments(prior or [])
-    measurements = session.source(file, reading | {"instrument": instrument})
-    shown = measurements if isinstance(measurements, Measurements) else measurements.part
-    known = known.prepared(session.model_names(models, shown), shown, ior=ior, tilt=tilt)
+    told = {"loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed, "second_opinion": check_posterior}
     target = out or files.default(file)
     with files.new(target, force=force, stale=page.POSTERIOR.format("*")) as draft:
         process.leave_on_interrupt(draft)
-        plan = session.Plan(
-            known, fixed, believed, loss, masking, not no_mcmc, seed, check_posterior, files.resumed(target)
-        )
-        found = session.study(measurements, plan)
+        with session.watch() as watch:
+            measurements = session.source(file, reading | {"instrument": instrument}, watch)
+            found = study(
+                measurements,
+                models,
+                fixed=fixed,
+                priors=believed,
+                sampling=not no_mcmc,
+                resume=files.resumed(target),
+                progress=watch,
+                **told,
+            )
         page.write(draft, found)
     if not no_mcmc:
         files.discard(files.resumed(target))
@@ -166,7 +172,7 @@ def check(
     from fitmat.cli import check
     from fitmat.measurements.reader import read
 
-    found = check.checked(read(file, **reading, instrument=instrument), plot, force=force)
+    found = check.check(read(file, **reading, instrument=instrument), plot, force=force)
     typer.echo(check.as_json(found) if json_ else str(found))
     if plot is None and not json_:
         typer.echo(f"See what was measured where: fitmat check {file} --plot coverage.png")
@@ -237,11 +243,14 @@ def design(
     from fitmat.cli import design, session
     from fitmat.measurements.reader import read
     from fitmat.models.parameters import assignments
+    from fitmat.studies.plan import plan
+    from fitmat.studies.study import fit_each
 
     measurements = read(file, **reading, instrument=instrument)
-    known = {name: {} for name in session.model_names(models, measurements)}
-    posteriors = session.fitted(measurements, session.Plan(known, assignments(fix or [], "--fix"), seed=seed))
-    found = design.planned(posteriors, for_, kind=kind, count=count, plot=plot, force=force)
+    jobs = plan(models, measurements, fixed=assignments(fix or [], "--fix"))
+    with session.watch() as watch:
+        posteriors = fit_each(measurements, jobs, seed=seed, progress=watch)
+    found = design.propose(posteriors, for_, kind=kind, count=count, picture=plot, force=force)
     typer.echo(design.as_json(found) if json_ else design.as_text(found))
 
 

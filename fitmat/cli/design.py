@@ -3,70 +3,59 @@
 It chooses nothing itself.
 """
 
-import io
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 
-from fitmat.errors import OutputError
-from fitmat.files import write_bytes
 from fitmat.judgement.design.design import MATCH, Design, Proposal, next_angles
 from fitmat.match.match import is_microfacet
+from fitmat.reports.pictures import refuse_picture, write_picture
 from fitmat.text import plain, text_table
 from fitmat.uncertainty.posterior import Posterior
 
-PICTURES = ("png", "svg", "pdf")
-DPI = 150
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
-def planned(
+def propose(
     posteriors: Sequence[Posterior],
     target: str | None,
     *,
     kind: Literal["sample", "curve"] = "sample",
     count: int = 5,
-    plot: Path | None = None,
+    picture: Path | None = None,
     force: bool = False,
 ) -> Design:
     """Find the next measurements and draw them.
 
     Args:
-        posteriors: Of fits to the same measurements; planned is for the first that has the target, the microfacet
+        posteriors: Of fits to the same measurements; the design is for the first that has the target, the microfacet
             model first, and for "match" against the next.
         target: A parameter, "match", or None for all parameters.
         kind: Single samples or whole curves.
         count: How many.
-        plot: The picture to write, or None.
+        picture: The picture to write, or None.
         force: Replace it where it exists.
 
     Raises:
         FitmatError: as `next_angles`.
-        OutputError: the picture exists and `force` is off, has no suffix of a picture, or cannot be written.
+        OutputError: as `refuse_picture` and `write_picture`.
     """
-    if plot is not None and os.path.lexists(plot) and not force:
-        raise OutputError(f"{plot}: already exists; choose another name, or --force to replace it.")
-    suffix = None if plot is None else plot.suffix.lower().removeprefix(".")
-    if suffix is not None and suffix not in PICTURES:
-        raise OutputError(f"{plot}: no picture, expected a name that ends in {', '.join(PICTURES)}. Rename it.")
+    refuse_picture(picture, force=force)
     ordered = sorted(posteriors, key=lambda p: not is_microfacet(p.fit.name))
     having = [p for p in ordered if any(target == e.name for e in p.fit.entries)]
     first = (having or ordered)[0]
     against = next((p for p in ordered if p is not first), None) if target == MATCH else None
     found = next_angles(first, target=target, against=against, kind=kind, count=count)
-    if plot is not None:
-        from matplotlib.figure import Figure
+    if picture is not None:
+        from fitmat.reports import plot
 
-        from fitmat.reports.plot import plot_design
-
-        buffer = io.BytesIO()
-        figure = Figure(figsize=(5.6, 4.4), layout="constrained")
-        plot_design(found, ax=figure.add_subplot())
-        figure.savefig(buffer, format=suffix, dpi=DPI, bbox_inches="tight")
-        write_bytes(plot, buffer.getvalue())
+        ax = plot.new_axes(5.6, 4.4)
+        plot.design(found, ax)
+        write_picture(cast("Figure", ax.figure), picture)
     return found
 
 

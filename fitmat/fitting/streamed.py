@@ -13,13 +13,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
+from fitmat._types import Progress
 from fitmat.fitting import fitting
 from fitmat.fitting.information import FOLLOWS, covariance, expected_information, is_positive, observed_information
 from fitmat.fitting.likelihood import NEGLIGIBLE, Data, noise_scale
 from fitmat.fitting.result import Fit, named_outcome
 from fitmat.fitting.streamed_sums import Sums, block_sums, blocks, prior_sums
 from fitmat.measurements.large.noise import Scatter, scatter
-from fitmat.measurements.large.stream import Progress, Rows
+from fitmat.measurements.large.stream import Stream
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector, with_vector
 
@@ -45,7 +46,7 @@ NO_CURVATURE = 1e-11
 
 
 def fit_chunks(
-    chunks: Rows,
+    chunks: Stream,
     to: str | AbstractBRDF,
     *,
     fixed: Mapping[str, ArrayLike] | None = None,
@@ -59,7 +60,7 @@ def fit_chunks(
     together to the maximum of the likelihood of all rows; bounds are kept by projection (Bertsekas 1982, eq. 32).
 
     Args:
-        chunks: A file, from `large.chunks.scan`, or measurements in memory, from `large.stream.held`.
+        chunks: A file, from `large.chunks.scan`, or measurements in memory, from `large.stream.hold`.
         to: A model name ("lambert+ggx"), or a model whose shapes and static choices are used.
         fixed: Parameters to hold, by name: `{"ks": 1.0}`.
         priors: What is known beforehand, by name, as in `fitting.fit`.
@@ -87,7 +88,7 @@ def fit_chunks(
 class _File(NamedTuple):
     """What a pass needs: the chunks, their noise, the fit of the part, and whom to tell."""
 
-    chunks: Rows
+    chunks: Stream
     known: Scatter
     start: Fit
     progress: Progress | None

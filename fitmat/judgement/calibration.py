@@ -7,7 +7,7 @@ materials obey the model is another question.
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import equinox as eqx
@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Bool, Float, Int
 from scipy.stats import binomtest
 
+from fitmat._types import Progress
 from fitmat.errors import FitmatError
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.fitting import fit
@@ -46,7 +47,6 @@ LOG_LIKELIHOOD = "log-likelihood"
 """A quantity beside the parameters; it notices what ranks of single parameters cannot (Modrák et al. 2023)."""
 
 Priors = Mapping[str, tuple[ArrayLike, ArrayLike]]
-Progress = Callable[[int, int], None]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -173,7 +173,7 @@ def calibrate(
         posterior = sample(fitted, seed=number) if method == "emcee" else laplace(fitted, seed=number)
         found.append(_placed(posterior, values[k], s[k]))
         if progress is not None:
-            progress(k + 1, simulations)
+            progress(f"calibrating {name}", k + 1, simulations)
     ranks, covered, trusted = (np.stack(part) for part in zip(*found, strict=True))
     return Calibration(name, method, _quantities(template), ranks, covered, trusted)
 

@@ -21,7 +21,7 @@ CHANCE = 1e-3
 """Probability, over all values of a file together, from which on a deviation is not put down to chance."""
 
 FAR_OFF = 3.0
-"""A given σ is doubted where it is wrong by more than this factor."""
+"""A given σ is find_doubts where it is wrong by more than this factor."""
 
 QUARTILE = 0.3186
 """Lower quartile of |N(0, 1)|: hardly any interpolation error where a curve bends reaches into it."""
@@ -56,7 +56,7 @@ class Doubts:
         return " ".join(self.words)
 
 
-def doubted(fit: Fit) -> Doubts:
+def find_doubts(fit: Fit) -> Doubts:
     """What speaks against the intervals of a fit.
 
     Args:

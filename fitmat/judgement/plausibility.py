@@ -7,7 +7,7 @@ out; they break laws by right.
 import numpy as np
 
 from fitmat.fitting.result import Fit
-from fitmat.models.albedo import directional_albedo
+from fitmat.models.albedo import albedo
 from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, evaluate
 
@@ -36,11 +36,11 @@ def broken_laws(fit: Fit) -> tuple[str, ...]:
         found.append("is not reciprocal")
     turns = np.zeros(1) if model.isotropic else np.array([0.0, np.pi / 2])
     theta, phi = (grid.ravel() for grid in np.meshgrid(ANGLES, turns, indexing="ij"))
-    albedo = directional_albedo(model, theta, phi)
-    above = albedo.value - albedo.error
+    reflected = albedo(model, theta, phi)
+    above = reflected.value - reflected.error
     if above.max() > 1.0 + IMPOSSIBLE:
         row = int(np.argmax(above.max(axis=1)))
-        found.append(f"reflects {albedo.value[row].max():.2f} of the light at {np.rad2deg(theta[row]):.0f}°")
+        found.append(f"reflects {reflected.value[row].max():.2f} of the light at {np.rad2deg(theta[row]):.0f}°")
     return tuple(found)
 
 

@@ -4,7 +4,6 @@ Judges two fits; draws nothing and prints nothing.
 """
 
 import dataclasses
-import functools
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
@@ -47,7 +46,7 @@ IMITATED = ("relative", "ngan", "cube-root", "log-ratio")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Comparison:
+class Match:
     """The match of two fits.
 
     Attributes:
@@ -73,6 +72,8 @@ class Comparison:
         ablation: Which terms of the microfacet lobe make the difference; None for lobes that have not these terms.
         telling: The difference against the noise of the instrument.
         perceived: What an eye sees of the difference on a sphere; None where it was not asked for.
+        imitations: The empirical model closest to the fitted microfacet model and the other way round, in each of
+            `IMITATED`; empty where it was not asked for.
     """
 
     empirical: Posterior
@@ -97,6 +98,7 @@ class Comparison:
     ablation: Ablation | None
     telling: Telling
     perceived: "Perceived | None"
+    imitations: tuple[Imitation, ...]
 
     @property
     def verdict(self) -> str:
@@ -130,14 +132,6 @@ class Comparison:
         unsure = [fit for fit in fits if fit.result in ("max_steps", "nonfinite")]
         return sentences + [f"Do not rely on this match: the fit of {f.name} ended {f.result}." for f in unsure]
 
-    @functools.cached_property
-    def imitations(self) -> tuple[Imitation, ...]:
-        """The empirical model closest to the fitted microfacet model and the other way round, in each of `IMITATED`."""
-        fits = self.empirical.fit, self.microfacet.fit
-        with ThreadPoolExecutor() as pool:
-            both = pool.map(lambda k: [imitate(fits[1 - k], fits[k].model, metric) for metric in IMITATED], (0, 1))
-        return tuple(found for each in both for found in each)
-
     def _repr_html_(self) -> str:
         return f"<p>{self.verdict}</p>"
 
@@ -156,16 +150,17 @@ def is_microfacet(name: str) -> bool:
     return any(LOBES[part].kind == "microfacet" for part in lobe_names(name))
 
 
-def compare(one: Posterior, other: Posterior, *, spheres: bool = True) -> Comparison:
+def compare(one: Posterior, other: Posterior, *, spheres: bool = True, imitations: bool = False) -> Match:
     """The match between an empirical and a microfacet model, in either order.
 
     Args:
         one: Posterior (`laplace` or `sample`) of a fit.
         other: Posterior of the other fit to the same measurements.
-        spheres: Whether to ask what an eye would see of the difference, the slowest part.
+        spheres: Whether to ask what an eye would see of the difference.
+        imitations: Whether to ask for the parameters with which each of the two best imitates the other.
 
     Returns:
-        A `Comparison`; intervals come from independent draws of both posteriors.
+        A `Match`; intervals come from independent draws of both posteriors.
 
     Raises:
         FitmatError: the two are not one empirical and one microfacet model, were fitted to different data, or are not
@@ -181,8 +176,15 @@ def compare(one: Posterior, other: Posterior, *, spheres: bool = True) -> Compar
         ablating = pool.submit(ablate, *models, draws=few)
         telling = pool.submit(tell_apart, *fits, draws=few)
         seeing = pool.submit(_perceived, *fits, draws=draws) if spheres else None
-    parts = {"ablation": ablating.result(), "telling": telling.result(), "perceived": seeing and seeing.result()}
+        imitating = pool.map(lambda pair: _imitated(*pair), (fits[::-1], fits)) if imitations else ()
+        parts = {"ablation": ablating.result(), "telling": telling.result(), "perceived": seeing and seeing.result()}
+        parts["imitations"] = tuple(found for each in imitating for found in each)
     return _concluded((empirical, microfacet), measuring.result(), **parts)
+
+
+def _imitated(what: Fit, by: Fit) -> list[Imitation]:
+    """The model of one fit closest to that of another, in each of `IMITATED`."""
+    return [imitate(what, by.model, metric) for metric in IMITATED]
 
 
 def _refuse_unlike(empirical: Posterior, microfacet: Posterior) -> None:
@@ -199,14 +201,14 @@ def _refuse_unlike(empirical: Posterior, microfacet: Posterior) -> None:
         raise FitmatError("compare needs two fits to the same Measurements object.")
 
 
-def _concluded(pair: tuple[Posterior, Posterior], found: Distances, **parts: Any) -> Comparison:
+def _concluded(pair: tuple[Posterior, Posterior], found: Distances, **parts: Any) -> Match:
     """The match from what was measured."""
     empirical, microfacet = pair
     gaps = found.albedos[0] - found.albedos[1]
     worst = int(np.argmax(np.abs(gaps[0])))
     n, alpha = _draws_of(empirical, "exponent"), _draws_of(microfacet, "alpha")
     width = None if n is None else alpha_from_exponent(n)
-    return Comparison(
+    return Match(
         empirical=empirical,
         microfacet=microfacet,
         hemisphere_distance=found.whole["relative"],

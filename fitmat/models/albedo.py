@@ -5,14 +5,12 @@ Integrals of a model; it judges nothing.
 
 import dataclasses
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import ArrayLike, Float
 
 from fitmat.maths.quadrature import AZIMUTH_NODES, ZENITH_NODES, incidence_rule, lobe_rule
 from fitmat.models.base import AbstractBRDF
+from fitmat.models.values import Draws, blocks, numbers, widths
 
 FINE = (ZENITH_NODES, AZIMUTH_NODES)
 
@@ -40,12 +38,13 @@ class Albedo:
     error: Float[np.ndarray, "k c"]
 
 
-def directional_albedo(model: AbstractBRDF, theta_i: ArrayLike, phi_i: ArrayLike = 0.0) -> Albedo:
-    """Fraction of the light from each direction that the surface reflects, ∫ f c_o dω_o.
+def albedo(model: AbstractBRDF, theta_i: ArrayLike | None = None, phi_i: ArrayLike = 0.0) -> Albedo:
+    """Fraction of the light that the surface reflects: from each direction, ∫ f c_o dω_o, or from all together.
 
     Args:
         model: From `fitmat.model`.
-        theta_i: Zenith angles of incidence in radians, 0 to π/2, (k,).
+        theta_i: Zenith angles of incidence in radians, 0 to π/2, (k,); None for light that comes evenly from the whole
+            hemisphere, ∫∫ f c_o c_i dω_o dω_i/π, one row.
         phi_i: Azimuths of incidence in radians, (k,) or one; of no consequence for isotropic models.
 
     Returns:
@@ -53,27 +52,32 @@ def directional_albedo(model: AbstractBRDF, theta_i: ArrayLike, phi_i: ArrayLike
 
     Example:
         >>> import fitmat as fm
-        >>> directional_albedo(fm.model("lambert", kd=0.5), [0.0, 1.0]).value.round(3).ravel()
+        >>> albedo(fm.model("lambert", kd=0.5), [0.0, 1.0]).value.round(3).ravel()
         array([0.5, 0.5])
     """
+    if theta_i is None:
+        return _from_everywhere(model)
     theta, phi = np.broadcast_arrays(np.atleast_1d(np.asarray(theta_i, float)), np.asarray(phi_i, float))
-    fine, coarse = (np.asarray(_albedo(model, jnp.asarray(theta), jnp.asarray(phi), n)) for n in (FINE, COARSE))
+    part = model, numbers(model)[None]
+    fine, coarse = (_albedo(part, float(widths(*part)[0]), (theta, phi), nodes) for nodes in (FINE, COARSE))
     return Albedo(fine, 2.0 * np.abs(fine - coarse) + LEAST)
 
 
-def hemispherical_albedo(model: AbstractBRDF) -> Albedo:
-    """Fraction reflected of light that comes evenly from the whole hemisphere, ∫∫ f c_o c_i dω_o dω_i/π; one row."""
+def _from_everywhere(model: AbstractBRDF) -> Albedo:
+    """The mean over the hemisphere, weighted with c_i."""
     theta, weight = incidence_rule()
     phi = np.zeros(1) if model.isotropic else (np.arange(AZIMUTHS) + 0.5) * np.pi / AZIMUTHS
-    found = directional_albedo(model, np.tile(theta, len(phi)), np.repeat(phi, len(theta)))
+    found = albedo(model, np.tile(theta, len(phi)), np.repeat(phi, len(theta)))
     share = np.tile(weight, len(phi)) / np.pi / len(phi)
     return Albedo((share @ found.value)[None], (share @ found.error)[None])
 
 
-@eqx.filter_jit
-def _albedo(model: AbstractBRDF, theta_i: Array, phi_i: Array, nodes: tuple[int, int]) -> Float[Array, "k c"]:
-    def one(theta: Array, phi: Array) -> Array:
-        rule = lobe_rule(theta, model.width(), phi_i=None if model.isotropic else phi, nodes=nodes)
-        return rule.weight @ jax.vmap(lambda wo: jnp.atleast_1d(model(rule.wi, wo)))(rule.wo)
-
-    return jax.lax.map(lambda pair: one(*pair), (theta_i, phi_i))
+def _albedo(
+    part: Draws, width: float, angles: tuple[np.ndarray, np.ndarray], nodes: tuple[int, int]
+) -> Float[np.ndarray, "k c"]:
+    turned = not part[0].isotropic
+    rules = [
+        lobe_rule(theta, width, phi_i=phi if turned else None, nodes=nodes) for theta, phi in zip(*angles, strict=True)
+    ]
+    found = blocks([part], [(rule.wi, rule.wo) for rule in rules])
+    return np.stack([rules[k].weight @ f[0] for _, k, (f,) in found])

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.models.albedo import directional_albedo
+from fitmat.models.albedo import albedo
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.parameters import Entry, bounds, entries, vector, with_vector
 from fitmat.models.registry import LOBES, OVER
@@ -81,9 +81,9 @@ def check(template: AbstractBRDF, *, seed: int) -> dict[str, Finding]:
     rng = np.random.default_rng(seed)
     values = jnp.asarray(_drawn(template, rng))
     smallest, gap = _signs(template, values, *(jnp.asarray(w) for w in _pairs(rng)))
-    albedo = [directional_albedo(with_vector(template, v), ANGLES) for v in values]
-    above = max(float((a.value - a.error).max()) for a in albedo)
-    white = directional_albedo(_white(template), ANGLES).value.ravel()
+    reflected = [albedo(with_vector(template, v), ANGLES) for v in values]
+    above = max(float((a.value - a.error).max()) for a in reflected)
+    white = albedo(_white(template), ANGLES).value.ravel()
     worst = float(white[np.argmax(np.abs(white - 1.0))])
     broken = unbounded(template)
     found = (

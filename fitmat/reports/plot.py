@@ -1,25 +1,26 @@
-"""Pictures of measurements, fits and matches: `plot_x(thing, ax=None) -> Axes`.
+"""Pictures of measurements, fits and matches: `plot.x(thing, ax=None) -> Axes`.
 
 Computes nothing that another room could; the only importer of matplotlib.
 """
 
+import itertools
 from collections.abc import Sequence
 
-import corner
 import numpy as np
+from corner import corner as corner_plot
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fitmat.fitting.result import Fit
 from fitmat.judgement.choice import SMALL, Choice
 from fitmat.judgement.design.design import Design
-from fitmat.judgement.prediction import Section, curve, predictive_band, standardised_residuals
 from fitmat.match.ablation import Ablation
 from fitmat.match.appearance.spheres import Perceived
 from fitmat.match.discernibility import SEPARATED, Telling
-from fitmat.match.match import Comparison
+from fitmat.match.match import Match
 from fitmat.match.regions import REGIONS
 from fitmat.maths.directions import signed_zenith
+from fitmat.studies.findings import Findings
+from fitmat.studies.study import Study
 from fitmat.uncertainty.posterior import Posterior
 
 # Okabe & Ito's palette, safe for colour-blind readers.
@@ -38,37 +39,46 @@ def new_axes(width: float = 5.0, height: float = 3.6) -> Axes:
     return Figure(figsize=(width, height), layout="constrained").add_subplot()
 
 
-def plot_section(
-    posteriors: Sequence[Posterior], section: Section, *, channel: int = 0, ax: Axes | None = None
-) -> Axes:
+def curves(study: Study, *, channel: int = 0) -> Figure:
+    """Measured points with every fit and its band, one panel for each section."""
+    along = range(len(study.findings[0].curves))
+    columns = 2 if len(along) in (2, 4) else min(3, len(along))
+    lines = -(-len(along) // columns)
+    figure = Figure(figsize=(max(3.6 * columns, 5.0), 2.7 * lines + 0.3), layout="constrained")
+    for k in along:
+        section(study, k, channel=channel, ax=figure.add_subplot(lines, columns, k + 1))
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), fontsize=9, frameon=False)
+    return figure
+
+
+def section(study: Study, which: int = 0, *, channel: int = 0, ax: Axes | None = None) -> Axes:
     """Measured points of one incidence angle with every fit and its 95 % predictive band.
 
     Args:
-        posteriors: Of fits to the same measurements.
-        section: From `prediction.sections`.
+        study: What was found.
+        which: Of the sections, in the order of `Findings.curves`.
         channel: Which channel.
         ax: Where to draw; a new figure if None.
     """
     ax = ax or new_axes()
-    m = posteriors[0].fit.measurements
-    rows = section.rows[m.valid[section.rows, channel]]
-    angle = np.rad2deg(signed_zenith(m.wi[rows], m.wo[rows]))
-    measured = m.value[rows, channel]
-    fine = np.sort(np.r_[np.linspace(-89, 89, 357), np.rad2deg(section.theta_i) + np.linspace(-3, 3, 121)])
-    fine = np.clip(fine, -89.0, 89.0)
+    m, drawn = study.measurements, [found.curves[which] for found in study.findings]
+    place = drawn[0].section
+    used = m.valid[place.rows, channel]
+    angle, measured = np.rad2deg(place.theta_o[used]), m.value[place.rows[used], channel]
     top = 0.0
-    for posterior, colour in zip(posteriors, FIT_COLOURS, strict=False):
-        low, high = predictive_band(posterior, rows)[:, :, channel]
+    for curve, colour in zip(drawn, FIT_COLOURS, strict=False):
+        low, high = curve.band[:, used, channel]
         ax.fill_between(angle, low, high, color=colour, alpha=0.18, lw=0)
-        line = curve(posterior.fit, section, np.deg2rad(fine))[:, channel]
+        line = curve.value[:, channel]
         top = max(top, float(line.max()))
-        ax.plot(fine, line, color=colour, lw=1.3, label=posterior.fit.name)
+        ax.plot(np.rad2deg(curve.theta_o), line, color=colour, lw=1.3, label=curve.name)
     ax.plot(angle, measured, ".", color=BLACK, ms=3.5, label="measured")
     _set_scale(ax, measured, top)
-    ax.axvline(np.rad2deg(section.theta_i), color="0.75", lw=0.8, ls=":", zorder=0)
+    ax.axvline(np.rad2deg(place.theta_i), color="0.75", lw=0.8, ls=":", zorder=0)
     ax.set(xlim=(-90, 90), xticks=[-60, -30, 0, 30, 60])
-    azimuth = f", azimuth {np.rad2deg(section.phi_i):.4g}°" if section.phi_i else ""
-    ax.set_title(f"incidence {np.rad2deg(section.theta_i):.4g}°{azimuth}", fontsize=9)
+    azimuth = f", azimuth {np.rad2deg(place.phi_i):.4g}°" if place.phi_i else ""
+    ax.set_title(f"incidence {np.rad2deg(place.theta_i):.4g}°{azimuth}", fontsize=9)
     ax.set_xlabel("θₒ / °  (positive = mirror side)", fontsize=8)
     ax.set_ylabel("BRDF / sr⁻¹", fontsize=8)
     ax.tick_params(labelsize=7)
@@ -86,10 +96,19 @@ def _set_scale(ax: Axes, measured: np.ndarray, top: float) -> None:
         ax.set_ylim(min(0.0, 1.2 * measured.min(initial=0.0)), 1.15 * highest)
 
 
-def plot_residuals(fit: Fit, *, channel: int = 0, ax: Axes | None = None) -> Axes:
+def residual_figure(study: Study, channels: Sequence[int] = (0,)) -> Figure:
+    """Standardised residuals, one row for each channel, one column for each model."""
+    columns = len(study.findings)
+    figure = Figure(figsize=(5.0 * columns, 3.0 * len(channels)), layout="constrained")
+    for k, (channel, found) in enumerate(itertools.product(channels, study.findings)):
+        residuals(found, channel=channel, ax=figure.add_subplot(len(channels), columns, k + 1))
+    return figure
+
+
+def residuals(found: Findings, *, channel: int = 0, ax: Axes | None = None) -> Axes:
     """Standardised residuals of one channel against theta_o, one colour per incidence angle."""
     ax = ax or new_axes()
-    z = standardised_residuals(fit)[:, channel]
+    fit, z = found.fit, found.residuals[:, channel]
     used = np.asarray(fit.data.weight)[:, channel] > 0
     wi, wo = np.asarray(fit.data.wi), np.asarray(fit.data.wo)
     theta_i = np.rad2deg(np.arccos(np.clip(wi[:, 2], -1, 1)))
@@ -107,7 +126,7 @@ def plot_residuals(fit: Fit, *, channel: int = 0, ax: Axes | None = None) -> Axe
     return ax
 
 
-def plot_albedo(match: Comparison, ax: Axes | None = None) -> Axes:
+def albedo(match: Match, ax: Axes | None = None) -> Axes:
     """Directional albedo of both models with 95 % bands, channel mean."""
     ax = ax or new_axes()
     angle = np.rad2deg(match.albedo_theta_i)
@@ -125,7 +144,7 @@ def plot_albedo(match: Comparison, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def plot_distances(match: Comparison, metric: str = "relative", ax: Axes | None = None) -> Axes:
+def distances(match: Match, metric: str = "relative", ax: Axes | None = None) -> Axes:
     """Distance of the two models at each incidence, over all directions and in each region, with 95 % bands."""
     ax = ax or new_axes()
     angle, found = np.rad2deg(match.distances.theta_i), match.distances
@@ -139,7 +158,7 @@ def plot_distances(match: Comparison, metric: str = "relative", ax: Axes | None 
     return _against_incidence(ax, f"{metric} distance")
 
 
-def plot_ablation(ablation: Ablation, ax: Axes | None = None) -> Axes:
+def ablation(ablation: Ablation, ax: Axes | None = None) -> Axes:
     """By how much the distance falls at each incidence without each term of the microfacet lobe, with 95 % bands."""
     ax = ax or new_axes()
     angle = np.rad2deg(ablation.theta_i)
@@ -151,7 +170,7 @@ def plot_ablation(ablation: Ablation, ax: Axes | None = None) -> Axes:
     return _against_incidence(ax, "fall of the distance / %")
 
 
-def plot_telling(telling: Telling, ax: Axes | None = None) -> Axes:
+def telling(telling: Telling, ax: Axes | None = None) -> Axes:
     """The difference of the models in standard deviations, of a reading and of all readings at each incidence."""
     ax = ax or new_axes()
     kinds = (telling.rms, ORANGE, "a single reading", 1.0), (telling.separation, BLUE, "all readings", SEPARATED)
@@ -169,7 +188,7 @@ def _against_incidence(ax: Axes, label: str) -> Axes:
     return ax
 
 
-def plot_choice(choice: Choice, ax: Axes | None = None) -> Axes:
+def choice(choice: Choice, ax: Axes | None = None) -> Axes:
     """How far each model is behind the best in elpd, with standard errors; grey: too close to call."""
     candidates = choice.candidates
     ax = ax or new_axes(6.4, 0.9 + 0.3 * len(candidates))
@@ -189,7 +208,7 @@ def plot_choice(choice: Choice, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def plot_left_out(choice: Choice, *, most: int = 4, ax: Axes | None = None) -> Axes:
+def left_out(choice: Choice, *, most: int = 4, ax: Axes | None = None) -> Axes:
     """Prediction errors of incidences that were left out, for the `most` best models that were refitted."""
     ax = ax or new_axes()
     shown = sorted([c for c in choice.candidates if c.left_out is not None][:most], key=lambda c: c.name)
@@ -204,7 +223,7 @@ def plot_left_out(choice: Choice, *, most: int = 4, ax: Axes | None = None) -> A
     return ax
 
 
-def plot_spheres(perceived: Perceived) -> Figure:
+def spheres(perceived: Perceived) -> Figure:
     """Both models' spheres, and below them where an eye sees a difference; one column for each lighting."""
     rows, count = (*perceived.names, "difference"), len(perceived.lightings)
     figure = Figure(figsize=(1.35 * count + 0.9, 4.3), layout="constrained")
@@ -229,16 +248,14 @@ def plot_spheres(perceived: Perceived) -> Figure:
     return figure
 
 
-def plot_corner(posterior: Posterior) -> Figure:
+def corner(posterior: Posterior) -> Figure:
     """Every free parameter against every other, with the best fit marked; fixed ones are left out."""
     fit = posterior.fit
-    m = fit.measurements
-    labels, columns = [], []
-    for entry in (e for e in fit.entries if e.name not in fit.held):
-        for k in range(entry.size):
-            channel = f" {m.channels[k]}" if entry.shape and len(m.channels) > 1 else ""
-            labels.append(entry.param.symbol.replace("k_d", "$k_d$").replace("k_s", "$k_s$") + channel)
-            columns.append(entry.place.start + k)
+    symbols = [e.param.symbol for e in fit.entries for _ in range(e.size)]
+    columns, labels = list(fit.coordinates.places), []
+    for name, k in zip(fit.coordinates.names, columns, strict=True):
+        channel = name.partition(" ")[1] + name.partition(" ")[2]
+        labels.append(symbols[k].replace("k_d", "$k_d$").replace("k_s", "$k_s$") + channel)
     draws = posterior.thinned(4000)[0][:, columns]
     spread = np.ptp(draws, axis=0)
     centre = draws.mean(axis=0)
@@ -248,7 +265,7 @@ def plot_corner(posterior: Posterior) -> Figure:
     ]
     side = 1.4 * len(columns) + 0.8
     several = len(columns) > 1
-    figure = corner.corner(
+    figure = corner_plot(
         draws, labels=labels, range=ranges, truths=fit.values[columns] if several else None, truth_color=ORANGE,
         color=BLUE, bins=24, quantiles=[0.025, 0.975], plot_datapoints=False, fig=Figure(figsize=(side, side)),
         label_kwargs={"fontsize": 9}, labelpad=0.2, max_n_ticks=3, smooth=0.8,
@@ -258,7 +275,7 @@ def plot_corner(posterior: Posterior) -> Figure:
     return figure
 
 
-def plot_design(design: Design, ax: Axes | None = None) -> Axes:
+def design(design: Design, ax: Axes | None = None) -> Axes:
     """Expected gain of a first measurement over the plane of incidence, the file's samples, and the proposals in order.
 
     Args:

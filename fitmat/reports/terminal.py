@@ -9,17 +9,17 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from fitmat.cli.session import MOST_SAMPLED
 from fitmat.fitting.result import RESULTS
-from fitmat.reports.page import rows
-from fitmat.studies.study import Study, detailed
+from fitmat.reports.rows import parameter_rows
+from fitmat.studies.findings import Findings
+from fitmat.studies.study import MOST_SAMPLED, Study
 from fitmat.uncertainty.posterior import Posterior
 
 
 def show(found: Study, folder: Path) -> None:
     """Print the parameters of every model, what speaks against them, the verdict and where the report is."""
     out = Console()
-    first = found.posteriors[0].fit
+    first = found.findings[0].fit
     out.print(str(first.measurements), markup=False, highlight=False)
     out.print(first.noise.words, markup=False, highlight=False)
     if first.n_values > MOST_SAMPLED:
@@ -27,35 +27,34 @@ def show(found: Study, folder: Path) -> None:
         out.print(words, highlight=False)
     if not first.loss.posterior:
         out.print(f"The loss {first.loss.name} is an objective: single fits, without a posterior.", highlight=False)
-    shown = detailed(found.posteriors, found.match, found.choice)
-    for posterior in shown:
-        out.print(f"\n[bold]{_title(posterior)}[/bold]", highlight=False)
-        out.print(_table(posterior))
-        _remark(out, found, posterior)
+    shown = found.detailed
+    for one in shown:
+        out.print(f"\n[bold]{_title(one.posterior)}[/bold]", highlight=False)
+        out.print(_table(one))
+        _remark(out, one)
     out.print("\n→ follows from the parameters above it", highlight=False, style="dim")
-    if len(shown) < len(found.posteriors):
-        out.print(f"{len(found.posteriors) - len(shown)} more models: see the report.", highlight=False, style="dim")
-    verdicts = [] if found.choice is None or len(found.posteriors) == len(shown) else [found.choice.verdict]
-    adequate = " ".join(f"{p.fit.name} {p.fit.adequacy}." for p in found.posteriors)
+    if len(shown) < len(found.findings):
+        out.print(f"{len(found.findings) - len(shown)} more models: see the report.", highlight=False, style="dim")
+    verdicts = [] if found.choice is None or len(found.findings) == len(shown) else [found.choice.verdict]
+    adequate = " ".join(f"{one.name} {one.fit.adequacy}." for one in found.findings)
     for words in (*verdicts, found.match.verdict if found.match else adequate):
         out.print(f"\n[bold]{words}[/bold]", highlight=False)
     out.print(f"\nReport: {folder / 'report.html'}", markup=False, highlight=False, soft_wrap=True)
 
 
-def _remark(out: Console, found: Study, posterior: Posterior) -> None:
+def _remark(out: Console, found: Findings) -> None:
     """How a fit ended, what speaks against it, and what the angles determine."""
-    if posterior.fit.result != "converged":
-        words = f"[yellow]{posterior.fit.result}[/yellow]: {RESULTS[posterior.fit.result]}"
+    result, against = found.fit.result, found.doubts
+    if result != "converged":
+        words = f"[yellow]{result}[/yellow]: {RESULTS[result]}"
         out.print(words, highlight=False)
-    if posterior.interrupted:
+    if found.posterior.interrupted:
         out.print("[yellow]interrupted[/yellow]: sampling was stopped; what was done is kept.", highlight=False)
-    against = found.doubts(posterior)
     if against.words:
         out.print(f"[yellow]{'inadequate' if against.inadequate else 'note'}[/yellow]: {against}", highlight=False)
-    for words in [i.words for i in found.identified if i.fit is posterior.fit]:
-        out.print(words, markup=False, highlight=False)
-    for opinion in [o for o in found.opinions if o.posterior is posterior]:
-        out.print(opinion.words, markup=False, highlight=False)
+    for said in (found.identifiability, found.second_opinion):
+        if said is not None:
+            out.print(said.words, markup=False, highlight=False)
 
 
 def _title(posterior: Posterior) -> str:
@@ -65,11 +64,11 @@ def _title(posterior: Posterior) -> str:
     return f"{fit.name}: {fit.result}, {agreeing}, {ending}"
 
 
-def _table(posterior: Posterior) -> Table:
+def _table(found: Findings) -> Table:
     table = Table(box=None, pad_edge=False)
     for heading in ("parameter", "", "value ± sd", "95 % interval", ""):
         table.add_column(heading, no_wrap=True)
-    for row in rows(posterior):
+    for row in parameter_rows(found):
         name = f"→ {row['name']}" if row["kind"] == "follows" else row["name"]
         remark = " ".join(part for part in (row["unit"], row["remark"].removesuffix(" by these angles")) if part)
         table.add_row(*(Text(cell) for cell in (name, row["symbol"], row["value"], row["interval"], remark)))

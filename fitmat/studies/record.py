@@ -6,24 +6,21 @@ It computes nothing; numbers that are not finite become null.
 from importlib.metadata import version
 from typing import Any
 
-from fitmat.fitting import priors
 from fitmat.fitting.result import RESULTS
 from fitmat.judgement.choice import Choice
 from fitmat.judgement.identifiability.verdicts import Identifiability
-from fitmat.judgement.metrics import fit_metrics
 from fitmat.match.appearance.spheres import Perceived, Spread
-from fitmat.match.match import Comparison
+from fitmat.match.match import Match
+from fitmat.studies.findings import Findings
 from fitmat.studies.study import Study
 from fitmat.text import plain
 from fitmat.uncertainty.estimate import Estimate
-from fitmat.uncertainty.posterior import Posterior
-from fitmat.uncertainty.quantities import Quantity, derived, parameters
+from fitmat.uncertainty.quantities import Quantity
 
 
 def to_dict(study: Study) -> dict[str, Any]:
     """What the report holds, as JSON types; numbers that are not finite become null."""
-    first = study.posteriors[0].fit
-    m = first.measurements
+    m, first = study.measurements, study.findings[0].fit
     return plain(
         {
             "fitmat": version("fitmat"),
@@ -35,19 +32,16 @@ def to_dict(study: Study) -> dict[str, Any]:
             "noise": first.noise.words,
             "loss": {"name": first.loss.name, "formula": first.loss.formula, "posterior": first.loss.posterior},
             "channels": list(m.channels),
-            "fits": [_fit_dict(p, study) for p in study.posteriors],
+            "fits": [_fit_dict(found) for found in study.findings],
             "choice": None if study.choice is None else _choice_dict(study.choice),
             "match": None if study.match is None else _match_dict(study.match),
         }
     )
 
 
-def _fit_dict(posterior: Posterior, study: Study) -> dict[str, Any]:
-    fit, d = posterior.fit, posterior.diagnostics
-    channels, doubts = len(fit.measurements.channels), study.doubts(posterior)
-    identified = next((i for i in study.identified if i.fit is fit), None)
-    check = next((c for c in study.checks if c.posterior is posterior), None)
-    opinion = next((o for o in study.opinions if o.posterior is posterior), None)
+def _fit_dict(found: Findings) -> dict[str, Any]:
+    posterior, fit, d = found.posterior, found.fit, found.posterior.diagnostics
+    channels, check, opinion = len(fit.measurements.channels), found.check, found.second_opinion
     diagnosed = {"ess_min": None, "rhat_max": None, "tau_max": None}
     if d is not None:
         diagnosed = {"ess_min": d.ess.min(), "rhat_max": d.rhat.max(), "tau_max": d.tau.max()}
@@ -58,16 +52,16 @@ def _fit_dict(posterior: Posterior, study: Study) -> dict[str, Any]:
         "result": fit.result,
         "result_means": RESULTS[fit.result],
         "adequacy": fit.adequacy,
-        "doubts": list(doubts.words),
-        "intervals_hold": not doubts.inadequate,
+        "doubts": list(found.doubts.words),
+        "intervals_hold": not found.doubts.inadequate,
         "not_determined": list(fit.undetermined),
         "n_starts": fit.n_starts,
         "n_starts_agreeing": fit.n_starts_agreeing,
         "steps": fit.steps,
-        "parameters": {q.name: _quantity_dict(q, channels) for q in parameters(posterior)},
-        "derived": {q.name: _quantity_dict(q, channels) for q in derived(posterior)},
-        "identifiability": None if identified is None else _identified_dict(identified),
-        "priors": priors.words(fit.model, fit.data.prior),
+        "parameters": {q.name: _quantity_dict(q, channels) for q in found.parameters},
+        "derived": {q.name: _quantity_dict(q, channels) for q in found.derived},
+        "identifiability": None if found.identifiability is None else _identified_dict(found.identifiability),
+        "priors": dict(found.priors),
         "posterior": {
             "verdict": posterior.verdict,
             "interrupted": posterior.interrupted,
@@ -76,7 +70,7 @@ def _fit_dict(posterior: Posterior, study: Study) -> dict[str, Any]:
             "second_sampler": None if opinion is None else {"verdict": opinion.verdict, "words": opinion.words},
         },
         "predictive_check": None if check is None else {"failed": bool(check.failed), "words": check.words},
-        "metrics": fit_metrics(fit),
+        "metrics": dict(found.metrics),
         "log_likelihood": fit.log_likelihood,
         "aicc": fit.aicc,
         "bic": fit.bic,
@@ -115,7 +109,7 @@ def _quantity_dict(q: Quantity, channels: int) -> dict[str, Any]:
     return {"value": value, "sd": sd, "ci95": ci95, "unit": q.unit, "symbol": q.symbol, "remark": q.remark}
 
 
-def _match_dict(match: Comparison) -> dict[str, Any]:
+def _match_dict(match: Match) -> dict[str, Any]:
     def estimate(e: Estimate | None) -> dict[str, Any] | None:
         return None if e is None else {"value": e.value, "ci95": list(e.ci95) if e.has_interval else None}
 

@@ -1,24 +1,45 @@
-"""A study: everything that is said of some models of the same measurements, in one noun.
+"""A study: the whole story of one file. Fit, sample, match, judge: everything is computed here, once.
 
-It fits and samples nothing: it gathers what other rooms say of posteriors.
+What people see of it, `reports` makes; nothing is written or printed here.
 """
 
 import dataclasses
-from collections.abc import Callable, Sequence
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
+import numpy as np
+from jaxtyping import ArrayLike
+
+from fitmat._types import Progress
+from fitmat.errors import ModelError
+from fitmat.fitting.losses import DEFAULT
+from fitmat.fitting.streamed import fit_chunks
 from fitmat.judgement.choice import Choice, choose
-from fitmat.judgement.doubts import Doubts, doubted
-from fitmat.judgement.identifiability.verdicts import Identifiability, identify
-from fitmat.judgement.predictive_check import PredictiveCheck, check_predictions
-from fitmat.match.match import Comparison
+from fitmat.judgement.identifiability.verdicts import identify
+from fitmat.judgement.prediction import sections
+from fitmat.judgement.predictive_check import check_predictions
+from fitmat.match.match import Match, compare, is_empirical, is_microfacet
+from fitmat.measurements.large.stream import Stream, hold
+from fitmat.measurements.samples import Measurements
+from fitmat.studies.findings import Findings, find
+from fitmat.studies.plan import DEFAULT_MODELS, Jobs, plan
+from fitmat.uncertainty import second_sampler
+from fitmat.uncertainty.chains import resumable_steps, sample
+from fitmat.uncertainty.laplace import laplace, laplace_each
 from fitmat.uncertainty.posterior import Posterior
-from fitmat.uncertainty.second_sampler import SecondOpinion, check_posterior
+
+MOST_AT_ONCE = 100_000
+"""Rows above which a fit passes over the data block by block."""
+
+MOST_SAMPLED = 50_000
+"""Values above which nothing is sampled: a step takes seconds, and Laplace's approximation is as good."""
 
 DETAILED = 4
 """Of more models than this, only so many are examined one by one: those of the match, then the best."""
 
-Progress = Callable[[str], None]
-"""Called with what is done next."""
+SAMPLING = "sampling"
+"""How the stages begin in which an interrupt keeps what was done."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -26,64 +47,206 @@ class Study:
     """What is known of some models of the same measurements.
 
     Attributes:
-        posteriors: In the order of the fits.
+        findings: One for each model, in the order of the fits.
         match: Of an empirical and a microfacet model among them; None where there is no such pair.
         choice: Which model the data prefer; None under a loss that weighs no models, and of a single model.
-        identified: What the angles determine, of `detailed` models.
-        checks: Whether the models can make such data, of the same; none under a robust loss, which expects bad values.
-        opinions: Of a second sampler, where it was asked for.
     """
 
-    posteriors: tuple[Posterior, ...]
-    match: Comparison | None = None
+    findings: tuple[Findings, ...]
+    match: Match | None = None
     choice: Choice | None = None
-    identified: tuple[Identifiability, ...] = ()
-    checks: tuple[PredictiveCheck, ...] = ()
-    opinions: tuple[SecondOpinion, ...] = ()
 
-    def doubts(self, posterior: Posterior) -> Doubts:
-        """What speaks against the intervals of one of the posteriors."""
-        return doubted(posterior.fit)
+    @property
+    def measurements(self) -> Measurements:
+        """What was fitted."""
+        return self.findings[0].fit.measurements
+
+    @property
+    def posteriors(self) -> tuple[Posterior, ...]:
+        """One for each model."""
+        return tuple(found.posterior for found in self.findings)
+
+    @property
+    def detailed(self) -> tuple[Findings, ...]:
+        """At most `DETAILED` models: those of the match, then the best; in the order of the fits."""
+        chosen = _detailed(self.posteriors, self.match, self.choice)
+        return tuple(found for found in self.findings if found.posterior in chosen)
 
 
-def concluded(
-    posteriors: Sequence[Posterior],
-    match: Comparison | None = None,
+def study(
+    measurements: Measurements | Stream,
+    models: str | Sequence[str] = DEFAULT_MODELS,
     *,
+    fixed: Mapping[str, ArrayLike] | None = None,
+    priors: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
+    loss: str = DEFAULT.name,
+    masking: str | None = None,
+    ior: str | None = None,
+    tilt: bool = False,
+    sampling: bool = True,
     seed: int = 0,
     second_opinion: bool = False,
+    resume: Path | None = None,
     progress: Progress | None = None,
 ) -> Study:
-    """Examine posteriors of fits to the same measurements.
+    """Fit models, sample their posteriors, match them and judge them: what `fitmat fit` does with a file.
+
+    Args:
+        measurements: From `fitmat.read`; more than `MOST_AT_ONCE` rows are passed over block by block.
+        models: Names, or a text with commas between them; "all" for every model that makes sense.
+        fixed: Parameters to hold, by name, in every model that has them: `{"ks": 1.0}`.
+        priors: What is known beforehand, by name: centre and standard deviation, `{"eta": (1.5, 0.05)}`.
+        loss: What the fits minimise, by name (`fitting.losses`).
+        masking: Of the microfacet lobes; None for each lobe's own.
+        ior: Material whose refractive index is taken from the literature: "Au".
+        tilt: Whether to fit how far the sample's normal leans.
+        sampling: Whether to sample; else, and for more than `MOST_SAMPLED` values, Laplace's approximation.
+        seed: Of everything that is drawn.
+        second_opinion: Whether to sample every posterior a second time with another method.
+        resume: Folder in which the sampling is kept while it lasts; None to keep nothing.
+        progress: Called with what is done next.
+
+    Returns:
+        A `Study`. An interrupt during sampling keeps what was done and leaves the rest to Laplace's approximation.
+
+    Raises:
+        FitmatError: as `fit`; a model or an option that concerns none is refused before anything is fitted.
+
+    Example:
+        >>> study(read("measurements.csv"), "lambert+phong,lambert+ggx").match.verdict  # doctest: +SKIP
+    """
+    say = progress or (lambda *_: None)
+    if second_opinion:
+        second_sampler.require()
+    stream = _as_stream(measurements)
+    shown = stream if isinstance(stream, Measurements) else stream.part
+    known = {"fixed": fixed, "priors": priors, "loss": loss, "masking": masking, "ior": ior, "tilt": tilt}
+    jobs = plan(models, shown, **known)
+    if isinstance(stream, Measurements):
+        first = fit_each(stream, jobs, seed=seed, corrected=not sampling, progress=say)
+    else:
+        first = _pass_over(stream, jobs, seed, say)
+    walking = sampling and first[0].fit.loss.posterior and first[0].fit.n_values <= MOST_SAMPLED
+    posteriors = _sample_each(first, seed, resume, say) if walking else first
+    return judge(posteriors, seed=seed, second_opinion=second_opinion, progress=say)
+
+
+def _as_stream(measurements: Measurements | Stream) -> Measurements | Stream:
+    if isinstance(measurements, Measurements) and measurements.n_samples > MOST_AT_ONCE:
+        return hold(measurements)
+    return measurements
+
+
+def fit_each(
+    measurements: Measurements, jobs: Jobs, *, seed: int, corrected: bool = True, progress: Progress | None = None
+) -> list[Posterior]:
+    """Every model of a plan fitted, with Laplace's approximation around each fit.
+
+    Args:
+        measurements: From `fitmat.read`.
+        jobs: From `plan`.
+        seed: Of the draws.
+        corrected: Whether the draws are weighted until they follow the posterior.
+        progress: Called with what is done next.
+    """
+    if progress is not None:
+        progress(f"fitting {', '.join(jobs) if len(jobs) <= DETAILED else f'{len(jobs)} models'}", 0, 0)
+    return laplace_each(measurements, jobs, seed=seed, corrected=corrected)
+
+
+def _pass_over(stream: Stream, jobs: Jobs, seed: int, say: Progress) -> list[Posterior]:
+    """Every model fitted to more rows than are taken at once."""
+    loss = next(iter(jobs.values()))["loss"]
+    if loss != DEFAULT.name:
+        raise ModelError(f"--loss {loss}: more than {MOST_AT_ONCE:,} rows are fitted under the default loss only.")
+    found = []
+    for name, job in jobs.items():
+        told = {key: value for key, value in job.items() if key != "loss"}
+
+        def passing(step: str, done: int, total: int, name: str = name) -> None:
+            say(f"fitting {name}: {step}", done, total)
+
+        found.append(laplace(fit_chunks(stream, name, **told, progress=passing), seed=seed))
+    return found
+
+
+def _sample_each(first: Sequence[Posterior], seed: int, resume: Path | None, say: Progress) -> list[Posterior]:
+    """Sample one fit after the other; after an interrupt, and for fits that are not finite, Laplace's draws stay."""
+    posteriors: list[Posterior] = []
+    for approximate in first:
+        fit = approximate.fit
+        if not fit.finite or any(posterior.interrupted for posterior in posteriors):
+            posteriors.append(approximate)
+            continue
+        kept = None if resume is None else resume / fit.name
+        steps = 0 if kept is None else _resumable(approximate, seed, kept)
+        say(f"{SAMPLING} {fit.name}{f', resumed at step {steps:,}' if steps else ''}", steps, 0)
+        posteriors.append(sample(fit, seed=seed, progress=say, checkpoint=kept))
+    return posteriors
+
+
+def _resumable(approximate: Posterior, seed: int, kept: Path) -> int:
+    """The step from which a run goes on; checkpoints of another run make way."""
+    if not kept.exists():
+        return 0
+    steps = resumable_steps(approximate.fit, seed=seed, checkpoint=kept)
+    if not steps:
+        shutil.rmtree(kept)
+    return steps
+
+
+def judge(
+    posteriors: Sequence[Posterior], *, seed: int, second_opinion: bool = False, progress: Progress | None = None
+) -> Study:
+    """Match, weigh and examine posteriors of fits to the same measurements.
 
     Args:
         posteriors: By `sample` or `laplace`.
-        match: Of two of them.
         seed: Of the replicated data and of the second sampler.
         second_opinion: Whether to sample chains a second time with another method.
-        progress: Called before each part with what it does.
+        progress: Called with what is done next.
     """
-    say = progress or (lambda _: None)
+    say = progress or (lambda *_: None)
+    say("comparing", 0, 0)
+    match = _match(posteriors)
     usable = [p for p in posteriors if p.fit.finite and p.fit.loss.posterior]
     choice = None
     if len(usable) > 1:
-        say("weighing the models")
+        say("weighing the models", 0, 0)
         choice = choose(usable, predicting=usable[0].fit.n_values == usable[0].fit.measurements.n_valid)
-    looked_at = detailed(usable, match, choice)
-    say("asking what the angles determine")
-    identified = tuple(identify(p) for p in looked_at)
-    say("replicating the data")
-    checks = tuple(check_predictions(p, seed=seed) for p in looked_at if not p.fit.loss.robust)
-    opinions = []
-    for posterior in looked_at if second_opinion else []:
-        say(f"sampling {posterior.fit.name} a second time")
-        opinions.append(check_posterior(posterior, seed=seed))
-    return Study(tuple(posteriors), match, choice, identified, checks, tuple(opinions))
+    along = sections(posteriors[0].fit.measurements)
+    looked_at = _detailed(usable, match, choice)
+    findings = []
+    for posterior in posteriors:
+        say(f"examining {posterior.fit.name}", 0, 0)
+        found = find(posterior, along)
+        findings.append(_examined(found, seed, second_opinion, say) if posterior in looked_at else found)
+    return Study(tuple(findings), match, choice)
 
 
-def detailed(usable: Sequence[Posterior], match: Comparison | None, choice: Choice | None) -> list[Posterior]:
-    """The posteriors that are examined one by one, in the order given."""
+def _examined(found: Findings, seed: int, second_opinion: bool, say: Progress) -> Findings:
+    """With what is asked of a few models only."""
+    posterior = found.posterior
+    check = None if posterior.fit.loss.robust else check_predictions(posterior, seed=seed)
+    opinion = None
+    if second_opinion:
+        say(f"sampling {posterior.fit.name} a second time", 0, 0)
+        opinion = second_sampler.check_posterior(posterior, seed=seed)
+    return dataclasses.replace(found, identifiability=identify(posterior), check=check, second_opinion=opinion)
+
+
+def _match(posteriors: Sequence[Posterior]) -> Match | None:
+    """The match of the first empirical and the first microfacet model, if there are both and both are finite."""
+    empirical = next((p for p in posteriors if is_empirical(p.fit.name)), None)
+    microfacet = next((p for p in posteriors if is_microfacet(p.fit.name) and not is_empirical(p.fit.name)), None)
+    if empirical is None or microfacet is None or not (empirical.fit.finite and microfacet.fit.finite):
+        return None
+    found = compare(empirical, microfacet, imitations=True)
+    return found if np.isfinite(found.hemisphere_distance.value) else None
+
+
+def _detailed(posteriors: Sequence[Posterior], match: Match | None, choice: Choice | None) -> tuple[Posterior, ...]:
+    """The posteriors that are examined one by one."""
     first = [] if match is None else [match.empirical, match.microfacet]
-    ranked = [] if choice is None else [c.posterior for c in choice.candidates]
-    chosen = list(dict.fromkeys(id(p) for p in (*first, *ranked, *usable)))[:DETAILED]
-    return [p for p in usable if id(p) in chosen]
+    ranked = [] if choice is None else [candidate.posterior for candidate in choice.candidates]
+    return tuple(dict.fromkeys((*first, *ranked, *posteriors)))[:DETAILED]

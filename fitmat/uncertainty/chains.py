@@ -5,13 +5,13 @@ This is the only room that imports emcee.
 
 import dataclasses
 import importlib.metadata
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import jax
 import numpy as np
 
+from fitmat._types import Progress
 from fitmat.errors import FitmatError, OutputError
 from fitmat.fitting.result import Fit
 from fitmat.uncertainty.checkpoint import Checkpoint, Saved, digest
@@ -30,9 +30,6 @@ MAX_STEPS = 8_000
 
 SAMPLED_BY = ("fitmat", "emcee", "numpy", "jax", "jaxlib")
 """Whose versions decide the last digit of a chain."""
-
-Progress = Callable[[int, int], None]
-"""Called with steps done and steps expected."""
 
 
 def sample(
@@ -56,7 +53,7 @@ def sample(
         seed: Seed of the whole run; the same seed gives the same chain.
         walkers: Size of the ensemble; default the larger of 32 and 4 per dimension.
         max_steps: Cap on steps per walker.
-        progress: Called now and then with steps done and steps expected.
+        progress: Called now and then with steps done and expected.
         checkpoint: Folder in which the run is kept while it lasts, and from which the same run goes on after it was
             killed, to the same chain; damaged parts of it are left out with a warning. Remove it when it has served.
 
@@ -81,7 +78,7 @@ def sample(
             if kept is not None:
                 kept.write(sampler.backend, goal, finished=sampler.iteration >= min(goal, max_steps))
             if progress is not None:
-                progress(sampler.iteration, min(max(goal, sampler.iteration), max_steps))
+                progress(f"sampling {fit.name}", sampler.iteration, min(max(goal, sampler.iteration), max_steps))
     except KeyboardInterrupt:
         interrupted = True
     if sampler.iteration < 4:

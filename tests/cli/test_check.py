@@ -10,7 +10,6 @@ import pytest
 import test_commands
 from test_commands import Run, assert_refused, curves, shell, strict
 
-from fitmat.cli import session
 from fitmat.errors import FitmatError
 from fitmat.measurements.instrument import UNKNOWN_SCALE, Instrument
 from fitmat.measurements.samples import Measurements
@@ -273,7 +272,7 @@ def reached(monkeypatch: pytest.MonkeyPatch) -> list[Measurements]:
         arrived.append(measurements)
         raise FitmatError("arrived")
 
-    monkeypatch.setattr(session, "study", study)
+    monkeypatch.setattr("fitmat.studies.study.study", study)
     return arrived
 
 

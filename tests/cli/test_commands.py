@@ -16,7 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from fitmat.cli import commands, session
+from fitmat._types import Progress
+from fitmat.cli import commands
+from fitmat.studies import study as room
 from fitmat.uncertainty.chains import CHUNK
 
 DATA = Path(__file__).parents[2] / "data" / "synthetic"
@@ -290,16 +292,16 @@ def test_same_seed_same_numbers(run, tmp_path):
 
 
 def test_interrupted_sampling_keeps_what_is_done(run, tmp_path, monkeypatch):
-    sample = session.sample
+    sample = room.sample
 
-    def interrupted(found: Any, *, seed: int, progress: Callable[[int, int], None], checkpoint: Path) -> Any:
-        def tick(done: int, total: int) -> None:
+    def interrupted(found: Any, *, seed: int, progress: Progress, checkpoint: Path) -> Any:
+        def tick(what: str, done: int, total: int) -> None:
             signal.raise_signal(signal.SIGINT)
-            progress(done, total)
+            progress(what, done, total)
 
         return sample(found, seed=seed, progress=tick, checkpoint=checkpoint)
 
-    monkeypatch.setattr(session, "sample", interrupted)
+    monkeypatch.setattr(room, "sample", interrupted)
     ended = run("fit", DATA / "sparse.csv", "--models", "lambert,lambert+phong", "--out", tmp_path / "out")
     assert ended.code == 3
     assert ended.err == ""
@@ -311,12 +313,12 @@ def test_interrupted_sampling_keeps_what_is_done(run, tmp_path, monkeypatch):
     assert "sampling was interrupted" in (tmp_path / "out" / "report.html").read_text()
 
 
-@pytest.mark.parametrize("room", ["laplace_each", "compare"])
-def test_interrupted_computation_leaves_nothing(run, tmp_path, monkeypatch, room):
+@pytest.mark.parametrize("part", ["laplace_each", "compare"])
+def test_interrupted_computation_leaves_nothing(run, tmp_path, monkeypatch, part):
     def interrupt(*_: object, **__: object) -> None:
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(session, room, interrupt)
+    monkeypatch.setattr(room, part, interrupt)
     ended = run("fit", DATA / "sparse.csv", "--no-mcmc", "--out", tmp_path / "out")
     assert_refused(ended, "interrupted before the end; no report was written", code=130)
     assert os.listdir(tmp_path) == []

@@ -121,7 +121,7 @@ def test_too_much_noise_told_is_found_as_too_wide_intervals() -> None:
 
 def test_chains_are_ranked_as_well() -> None:
     seen: list[tuple[int, int]] = []
-    few = lambert(simulations=2, method="emcee", progress=lambda done, of: seen.append((done, of)))
+    few = lambert(simulations=2, method="emcee", progress=lambda what, done, of: seen.append((done, of)))
     assert few.method == "emcee"
     assert few.trusted.all()
     assert ((few.ranks >= 0) & (few.ranks <= DRAWS)).all()

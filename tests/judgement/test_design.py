@@ -171,7 +171,7 @@ def test_what_cannot_be_planned_is_refused(lambert: Fit) -> None:
 
 def test_a_plan_is_shown_as_text_as_json_and_drawn(lambert: Fit, tmp_path: Path) -> None:
     posterior, picture = fm.laplace(lambert, seed=1), tmp_path / "plan.png"
-    found = plan.planned([posterior], "kd", count=2, plot=picture)
+    found = plan.propose([posterior], "kd", count=2, picture=picture)
     with Image.open(picture) as image:
         assert min(image.size) > 300
     assert "For kd of lambert, the sample that tells most: light at" in plan.as_text(found)
@@ -180,11 +180,11 @@ def test_a_plan_is_shown_as_text_as_json_and_drawn(lambert: Fit, tmp_path: Path)
     assert [len(p["theta_o_deg"]) for p in told["proposals"]] == [1, 1]
     assert told["sd_before"]["kd"] == {"sd": pytest.approx(found.sd[0]), "of": "value"}
     with pytest.raises(OutputError, match=r"plan.png: already exists; choose another name, or --force"):
-        plan.planned([posterior], "kd", plot=picture)
+        plan.propose([posterior], "kd", picture=picture)
     with pytest.raises(OutputError, match=r"plan.txt: no picture, expected a name that ends in png, svg, pdf"):
-        plan.planned([posterior], "kd", plot=tmp_path / "plan.txt")
+        plan.propose([posterior], "kd", picture=tmp_path / "plan.txt")
     curves = fm.next_angles(posterior, kind="curve", count=1)
     samples = curves.candidates.used.sum(axis=1)
     np.testing.assert_allclose(curves.gains, np.sqrt(1 + samples / 60), rtol=CLOSED)
-    ax = fm.plot_design(curves)
+    ax = fm.plot.design(curves)
     assert ax.get_xlabel() == "incidence θᵢ / °"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fitmat as fm
-from fitmat.judgement.doubts import doubted
+from fitmat.judgement.doubts import find_doubts
 
 ANGLES = np.deg2rad([10.0, 30.0, 50.0, 70.0]), np.deg2rad(np.arange(-80.0, 81.0, 2.0))
 CAUTION = "The intervals hold only if the model and the noise are right, which these data contradict."
@@ -24,7 +24,7 @@ def changed(m: fm.Measurements, value: np.ndarray) -> fm.Measurements:
 
 
 def test_good_data_raise_no_doubt(made: fm.Measurements) -> None:
-    found = doubted(fm.fit(made, "lambert+ggx"))
+    found = find_doubts(fm.fit(made, "lambert+ggx"))
     assert found.words == ()
     assert not found.inadequate
 
@@ -36,7 +36,7 @@ def test_contradictory_repeats_are_named(made: fm.Measurements) -> None:
     doubled = made.rows(np.r_[np.arange(made.n_samples), row])
     value = doubled.value.copy()
     value[-1] += 10 * np.sqrt(2) * made.sigma[row]
-    found = doubted(fm.fit(changed(doubled, value), "lambert+ggx"))
+    found = find_doubts(fm.fit(changed(doubled, value), "lambert+ggx"))
     assert found.inadequate
     assert found.words[0].startswith("Two measurements of one geometry (θᵢ 10°, θₒ 0°) differ by 10 times their noise")
     assert found.words[-1] == CAUTION
@@ -45,14 +45,14 @@ def test_contradictory_repeats_are_named(made: fm.Measurements) -> None:
 @pytest.mark.parametrize(("factor", "words"), [(1e-3, "1e+03 times smaller"), (1e3, "times larger")])
 def test_a_sigma_that_is_off_by_a_thousand_is_doubted(made: fm.Measurements, factor: float, words: str) -> None:
     assert made.sigma is not None
-    found = doubted(fm.fit(dataclasses.replace(made, sigma=factor * made.sigma), "lambert+ggx"))
+    found = find_doubts(fm.fit(dataclasses.replace(made, sigma=factor * made.sigma), "lambert+ggx"))
     assert found.inadequate
     assert words in str(found)
     assert "correct its unit" in str(found)
 
 
 def test_identical_values_are_named(made: fm.Measurements) -> None:
-    found = doubted(fm.fit(changed(made, np.full_like(made.value, 0.3)), "lambert+ggx"))
+    found = find_doubts(fm.fit(changed(made, np.full_like(made.value, 0.3)), "lambert+ggx"))
     assert found.inadequate
     assert "are identical (0.3 sr⁻¹)" in found.words[0]
 
@@ -61,7 +61,7 @@ def test_identical_values_are_named(made: fm.Measurements) -> None:
 def test_retro_reflection_is_recognised(made: fm.Measurements, loss: str) -> None:
     """A peak towards the light, which no model here has; also under a loss that takes the model as exact."""
     back = 0.5 * np.exp(-(((made.signed_theta_o + made.theta_i) / 0.1) ** 2))
-    found = doubted(fm.fit(changed(made, made.value + back[:, None]), "lambert+ggx", loss=loss))
+    found = find_doubts(fm.fit(changed(made, made.value + back[:, None]), "lambert+ggx", loss=loss))
     assert found.inadequate
     assert "lambert+ggx is inadequate: it misses the data by " in found.words[0]
     assert "back towards the light (retro-reflection), where it is too dark" in found.words[0]
@@ -71,7 +71,7 @@ def test_retro_reflection_is_recognised(made: fm.Measurements, loss: str) -> Non
 def test_bad_values_are_counted(made: fm.Measurements) -> None:
     value = made.value.copy()
     value[[3, 100, 200]] *= 1.4
-    found = doubted(fm.fit(changed(made, value), "lambert+ggx", loss="mixture"))
+    found = find_doubts(fm.fit(changed(made, value), "lambert+ggx", loss="mixture"))
     assert found.words[0].startswith("3 of 324 values are probably bad, the worst at ")
     assert not found.inadequate
 
@@ -82,5 +82,5 @@ def test_no_wrong_alarm_over_many_seeds() -> None:
     doubts = 0
     for seed in range(40):
         m = fm.simulate(truth, *ANGLES, relative_noise=0.02, absolute_noise=1e-3, seed=seed)
-        doubts += bool(doubted(fm.fit(m, "lambert+ggx")).words)
+        doubts += bool(find_doubts(fm.fit(m, "lambert+ggx")).words)
     assert doubts <= 2

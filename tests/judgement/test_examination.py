@@ -167,14 +167,14 @@ def test_phong_at_normal_incidence_adds_up_to_its_weight() -> None:
 def test_a_microfacet_lobe_adds_up_to_its_directional_albedo() -> None:
     """The quadrature of `energy`, which is proved against closed forms, over the model itself."""
     truth: dict[str, Any] = {"kd": 0.2, "alpha": 0.3, "eta": 6.0}
-    expected = fm.directional_albedo(fm.model("lambert+ggx", **truth), FOUR).value[:, 0]
+    expected = fm.albedo(fm.model("lambert+ggx", **truth), FOUR).value[:, 0]
     found = added(measured(**truth, **ROUND))
     assert [a.value[0] / a.covered for a in found] == pytest.approx(expected, rel=LINEAR)
 
 
 def test_a_curve_turned_about_the_mirror_direction_adds_up() -> None:
     truth: dict[str, Any] = {"kd": 0.2, "alpha": 0.15, "eta": 6.0}
-    expected = fm.directional_albedo(fm.model("lambert+ggx", **truth), FOUR).value[:, 0]
+    expected = fm.albedo(fm.model("lambert+ggx", **truth), FOUR).value[:, 0]
     found = added(measured(**truth, theta_o=np.deg2rad(np.arange(-88, 88.1, 1))))
     assert [a.value[0] for a in found] == pytest.approx(expected, rel=TURNED)
 
@@ -182,7 +182,7 @@ def test_a_curve_turned_about_the_mirror_direction_adds_up() -> None:
 def test_an_unresolved_lobe_has_an_uncertain_albedo() -> None:
     """α = 0.01 on a grid of 4°: the sum depends on where the samples fall, and says so."""
     truth: dict[str, Any] = {"kd": 0.2, "alpha": 0.01, "eta": 6.0}
-    expected = fm.directional_albedo(fm.model("lambert+ggx", **truth), np.deg2rad([20.0])).value[0, 0]
+    expected = fm.albedo(fm.model("lambert+ggx", **truth), np.deg2rad([20.0])).value[0, 0]
     (a,) = added(measured(**truth, theta_i=np.deg2rad([20.0]), **ROUND))
     assert abs(a.value[0] - expected) < a.error[0]
     assert not a.too_large.any()

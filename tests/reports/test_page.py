@@ -15,13 +15,16 @@ import polars as pl
 import pytest
 
 import fitmat
-from fitmat.cli import session
+from fitmat.errors import OutputError
 from fitmat.measurements.samples import Measurements
 from fitmat.models.simulation import simulate
 from fitmat.reports import page
+from fitmat.reports.rows import parameter_rows
 from fitmat.studies import record
-from fitmat.studies.study import Study
+from fitmat.studies.findings import find
+from fitmat.studies.study import Study, study
 from fitmat.text import interval, with_error
+from fitmat.uncertainty.posterior import Posterior
 
 NAMES = ["lambert+blinn-phong", "lambert+ggx"]
 
@@ -36,7 +39,12 @@ def paint() -> Measurements:
 
 @pytest.fixture(scope="module")
 def studied() -> Study:
-    return session.study(paint(), session.Plan({name: {} for name in NAMES}, sampling=False))
+    return study(paint(), NAMES, sampling=False)
+
+
+def alone(posterior: Posterior) -> Study:
+    """A study of one model, without sections."""
+    return Study((find(posterior, ()),))
 
 
 @pytest.fixture(scope="module")
@@ -121,7 +129,7 @@ def test_names_are_escaped(studied):
         posterior.fit.measurements, source=evil, channels=(evil, "g", "b"), notes=(evil,), masked={evil: 1}
     )
     fit = dataclasses.replace(posterior.fit, measurements=measurements)
-    found = Page(page.to_html(Study((dataclasses.replace(posterior, fit=fit),))))
+    found = Page(page.to_html(alone(dataclasses.replace(posterior, fit=fit))))
     assert "script" not in found.tags
     assert found.text.count(evil) >= 4
 
@@ -129,7 +137,7 @@ def test_names_are_escaped(studied):
 def test_outcomes_are_labelled(studied):
     posterior = studied.posteriors[1]
     odd = dataclasses.replace(posterior.fit, result="unidentifiable", undetermined=("eta", "ks"))
-    text = Page(page.to_html(Study((dataclasses.replace(posterior, fit=odd, interrupted=True),)))).text
+    text = Page(page.to_html(alone(dataclasses.replace(posterior, fit=odd, interrupted=True)))).text
     assert "lambert+ggx: unidentifiable. At least one parameter is not determined by these angles: fix it" in text
     assert "Not determined: ks, eta." in text or "Not determined: eta, ks." in text
     assert "sampling was interrupted; what was done is kept" in text
@@ -170,14 +178,17 @@ def test_json_lists_channels_and_not_what_they_share(studied):
 def test_json_has_null_for_what_is_not_finite(studied):
     posterior = studied.posteriors[0]
     fit = dataclasses.replace(posterior.fit, log_likelihood=math.nan, covariance=posterior.fit.covariance * math.inf)
-    found: dict[str, Any] = record.to_dict(Study((dataclasses.replace(posterior, fit=fit),)))
+    found: dict[str, Any] = record.to_dict(alone(dataclasses.replace(posterior, fit=fit)))
     text = json.dumps(found, allow_nan=False)
     assert json.loads(text)["fits"][0]["bic"] is None
     assert found["match"] is None
 
 
-def test_write_makes_every_file(studied, tmp_path):
-    page.write(tmp_path, studied)
+def test_report_makes_every_file(studied, tmp_path):
+    assert fitmat.report(studied, tmp_path / "run") == tmp_path / "run" / "report.html"
+    with pytest.raises(OutputError, match="already exists"):
+        fitmat.report(studied, tmp_path / "run")
+    tmp_path = tmp_path / "run"
     names = ["fit.json", *(f"posterior-{name}.parquet" for name in NAMES), "report.html"]
     assert sorted(path.name for path in tmp_path.iterdir()) == names
     draws, posterior = pl.read_parquet(tmp_path / names[2]), studied.posteriors[1]
@@ -219,7 +230,7 @@ def test_intervals_have_the_digits_of_their_value(low, high, sd, text):
 def test_what_is_not_determined_shows_no_error(studied):
     posterior = studied.posteriors[1]
     fit = dataclasses.replace(posterior.fit, result="unidentifiable", undetermined=("eta",))
-    found = {row["name"]: row for row in page.rows(dataclasses.replace(posterior, fit=fit))}
+    found = {row["name"]: row for row in parameter_rows(find(dataclasses.replace(posterior, fit=fit), ()))}
     for name in ("eta", "f0"):
         assert found[name]["remark"] == "not determined by these angles"
         assert "±" not in found[name]["value"]

@@ -173,7 +173,8 @@ def test_draws_respect_the_bounds() -> None:
 def test_an_interrupt_keeps_what_was_done(fit: Fit, calls: int) -> None:
     seen: list[tuple[int, int]] = []
 
-    def stop(done: int, expected: int) -> None:
+    def stop(what: str, done: int, expected: int) -> None:
+        assert what == f"sampling {fit.name}"
         seen.append((done, expected))
         if len(seen) == calls:
             raise KeyboardInterrupt

@@ -110,10 +110,15 @@ def test_remarks_say_why_a_number_is_missing(fit: Fit) -> None:
     assert np.isnan([found[name].sd for name in ("kd", "ks", "eta")]).all()
 
 
+def following(posterior: Posterior) -> list[Quantity]:
+    """What follows from a posterior's parameters."""
+    return derived(posterior, parameters(posterior))
+
+
 def test_f0_follows_from_eta(fit: Fit) -> None:
     """((η−1)/(η+1))² rises with η, so that its quantiles are those of η."""
     posterior = draws(fit, "ggx", {"ks": 1.0, "alpha": 0.1, "eta": 3.0})
-    f0, eta = named(derived(posterior))["f0"], posterior.values[:, 2]
+    f0, eta = named(following(posterior))["f0"], posterior.values[:, 2]
     assert f0.value == pytest.approx([0.25])
     low, high = np.quantile(eta, [0.025, 0.975])
     np.testing.assert_allclose(f0.ci95[0], [((n - 1) / (n + 1)) ** 2 for n in (low, high)], rtol=INTERPOLATION)
@@ -122,7 +127,7 @@ def test_f0_follows_from_eta(fit: Fit) -> None:
 
 def test_eta_follows_from_f0(fit: Fit) -> None:
     posterior = draws(fit, "ggx-schlick", {"ks": 1.0, "alpha": 0.1, "f0": 0.25})
-    found = named(derived(posterior))
+    found = named(following(posterior))
     assert found["eta"].value == pytest.approx([3.0])
     low, high = (np.sqrt(f) for f in np.quantile(posterior.values[:, 2], [0.025, 0.975]))
     expected = [(1 + low) / (1 - low), (1 + high) / (1 - high)]
@@ -133,7 +138,7 @@ def test_eta_follows_from_f0(fit: Fit) -> None:
 def test_f0_of_a_metal_follows_from_both_parts_of_its_index(fit: Fit) -> None:
     """((η−1)² + κ²)/((η+1)² + κ²), Born & Wolf sec. 14.2."""
     posterior = draws(fit, "ggx-conductor", {"ks": 1.0, "alpha": 0.1, "eta": 0.5, "kappa": 2.5})
-    f0, (eta, kappa) = named(derived(posterior))["f0"], posterior.values[:, 2:].T
+    f0, (eta, kappa) = named(following(posterior))["f0"], posterior.values[:, 2:].T
     assert f0.value == pytest.approx([6.5 / 8.5])
     expected = np.abs((eta + 1j * kappa - 1) / (eta + 1j * kappa + 1)) ** 2
     np.testing.assert_allclose(f0.ci95[0], np.quantile(expected, [0.025, 0.975]))
@@ -141,11 +146,11 @@ def test_f0_of_a_metal_follows_from_both_parts_of_its_index(fit: Fit) -> None:
 
 def test_widths_and_exponents_imply_each_other(fit: Fit) -> None:
     """α² = 2/(n+2): a Blinn lobe of n = 198 is as wide as a microfacet lobe of α = 0.1; the roughness is √α."""
-    facets = named(derived(draws(fit, "ggx", {"ks": 1.0, "alpha": 0.1, "eta": 3.0})))
+    facets = named(following(draws(fit, "ggx", {"ks": 1.0, "alpha": 0.1, "eta": 3.0})))
     assert facets["exponent"].value == pytest.approx([198.0])
     assert facets["roughness"].value == pytest.approx([np.sqrt(0.1)])
     assert facets["exponent"].ci95[0, 0] < 198 < facets["exponent"].ci95[0, 1]
-    blinn = named(derived(draws(fit, "blinn-phong", {"ks": 1.0, "exponent": 198.0})))
+    blinn = named(following(draws(fit, "blinn-phong", {"ks": 1.0, "exponent": 198.0})))
     assert set(blinn) == {"alpha"}
     assert blinn["alpha"].value == pytest.approx([0.1])
 
@@ -153,7 +158,7 @@ def test_widths_and_exponents_imply_each_other(fit: Fit) -> None:
 def test_what_follows_from_an_unknown_is_unknown(fit: Fit) -> None:
     posterior = draws(fit, "ggx", {"ks": 1.0, "alpha": 0.1, "eta": 3.0})
     unknown = dataclasses.replace(posterior, fit=dataclasses.replace(posterior.fit, held={"eta": np.array([3.0])}))
-    f0 = named(derived(unknown))["f0"]
+    f0 = named(following(unknown))["f0"]
     assert f0.remark == "fixed"
     assert np.isnan(f0.sd).all()
-    assert derived(draws(fit, "lambert", {"kd": 0.3})) == []
+    assert following(draws(fit, "lambert", {"kd": 0.3})) == []

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool
 
+from fitmat._types import Progress
 from fitmat.errors import ReadError
 from fitmat.measurements.instrument import IDEAL, Instrument
 from fitmat.measurements.large import tables
-from fitmat.measurements.large.first_pass import Look, joined_rows, magnitudes, named
-from fitmat.measurements.large.stream import CHUNK, PART, Progress, spread
+from fitmat.measurements.large.first_pass import FirstPass, joined_rows, magnitudes, named
+from fitmat.measurements.large.stream import CHUNK, PART, is_kept
 from fitmat.measurements.options import Options
 from fitmat.measurements.parsing import contents, tabular
 from fitmat.measurements.parsing.columns import assign
@@ -67,7 +68,7 @@ class Chunks:
 
     def in_part(self, first: int, count: int) -> Bool[np.ndarray, " count"]:
         """Which of `count` rows, from the file's row `first` (from 0) on, are in `part`."""
-        return spread(np.arange(first, first + count), self.thinning)
+        return is_kept(np.arange(first, first + count), self.thinning)
 
 
 def is_large(path: str | os.PathLike[str]) -> bool:
@@ -90,7 +91,7 @@ def scan(
     progress: Progress | None = None,
     **conventions: Any,
 ) -> Chunks:
-    """Look through a large CSV or Parquet file.
+    """FirstPass through a large CSV or Parquet file.
 
     Args:
         path: Of the file.
@@ -107,7 +108,7 @@ def scan(
     options = Options(**conventions)
     # One chunk may hold small angles only; whether all do is asked at the end. Rows are chosen here.
     lenient = dataclasses.replace(options, angle_unit=options.angle_unit or "degrees", where=None)
-    look = Look(part)
+    look = FirstPass(part)
     for table in _chosen(path, rows, options.where):
         _refuse_long(table, columns, options)
         look.add(tabular.recording(table, columns, lenient), table)
@@ -165,7 +166,7 @@ def _converted(recording: Recording, options: Options, sentinel: float | None) -
     return dataclasses.replace(found, value=np.where(recording.value < 0, -found.value, found.value))
 
 
-def _part(look: Look, options: Options) -> Measurements:
+def _part(look: FirstPass, options: Options) -> Measurements:
     """The kept rows, with the counts and notes of the whole file."""
     part = _converted(joined_rows(look.kept), options, look.sentinel)
     notes = [note for note in part.notes if not any(other.startswith(note) and other != note for other in look.notes)]

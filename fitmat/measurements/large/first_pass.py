@@ -1,4 +1,4 @@
-"""Look: what one pass over a large file finds out about all of it, and the rows that are kept to stand for it.
+"""FirstPass: what one pass over a large file finds out about all of it, and the rows that are kept to stand for it.
 
 It converts nothing and reads no file.
 """
@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Int
 
-from fitmat.measurements.large.stream import spread
+from fitmat.measurements.large.stream import is_kept
 from fitmat.measurements.parsing.recording import Recording, mask
 from fitmat.measurements.parsing.table import Table
 
 
-class Look:
+class FirstPass:
     """What the first look finds out, chunk by chunk.
 
     Attributes:
@@ -57,7 +57,7 @@ class Look:
         at = len(self.kept) - 1
         while True:
             for k in range(at, len(self.kept)):
-                chosen = spread(self._index[k], self.thinning)
+                chosen = is_kept(self._index[k], self.thinning)
                 self._index[k], self.kept[k] = self._index[k][chosen], _rows(self.kept[k], chosen)
             if sum(map(len, self._index)) <= self._most:
                 return

@@ -8,7 +8,8 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.measurements.large.stream import Progress, Rows
+from fitmat._types import Progress
+from fitmat.measurements.large.stream import Stream
 from fitmat.measurements.noise import Noise, at_level, law, law_words, leave_one_out, measured_noise
 from fitmat.measurements.samples import Measurements
 
@@ -50,7 +51,7 @@ def _smoothed(m: Measurements, level: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(level), np.abs(level), np.abs(m.value))
 
 
-def scatter(chunks: Rows, progress: Progress | None = None) -> Scatter:
+def scatter(chunks: Stream, progress: Progress | None = None) -> Scatter:
     """The noise of a large file: one pass, unless the file gives σ.
 
     Neighbours are sought in all rows of a chunk, a and b come from the rows of the part. Rows at either end of a chunk

@@ -1,10 +1,10 @@
-"""Rows: more measurements than are fitted at once, block by block, wherever they come from.
+"""Stream: more measurements than are fitted at once, block by block, wherever they come from.
 
 It reads no file and fits nothing.
 """
 
 import dataclasses
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Protocol
 
 import numpy as np
@@ -18,14 +18,11 @@ CHUNK = 200_000
 PART = 12_000
 """Most rows of the part that stands for all of them."""
 
-Progress = Callable[[str, int, int], None]
-"""Called with what is done, rows done and rows expected (0 while nobody knows)."""
-
 _GOLDEN = 0x9E3779B97F4A7C15
 # 2⁶⁴/φ: the multiples of it modulo 2⁶⁴ fill the range evenly, in step with no grid of angles.
 
 
-class Rows(Protocol):
+class Stream(Protocol):
     """Measurements that are passed over again and again.
 
     Attributes:
@@ -58,12 +55,12 @@ class Rows(Protocol):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Held:
-    """Measurements in memory as `Rows`.
+    """Measurements in memory as a `Stream`.
 
     Attributes:
-        n_samples: See `Rows`.
-        n_valid: See `Rows`.
-        part: See `Rows`.
+        n_samples: See `Stream`.
+        n_valid: See `Stream`.
+        part: See `Stream`.
         thinning: One row in so many is in `part`.
     """
 
@@ -78,20 +75,20 @@ class Held:
             yield self.whole.rows(np.arange(first, min(first + CHUNK, self.n_samples)))
 
     def in_part(self, first: int, count: int) -> Bool[np.ndarray, " count"]:
-        """See `Rows`."""
-        return spread(np.arange(first, first + count), self.thinning)
+        """See `Stream`."""
+        return is_kept(np.arange(first, first + count), self.thinning)
 
 
-def held(m: Measurements) -> Held:
+def hold(m: Measurements) -> Held:
     """All rows with a valid value, and a part of them for starts and pictures."""
     m = m.rows(np.flatnonzero(m.valid.any(axis=1)))
     thinning = -(-m.n_samples // PART)
-    kept = np.flatnonzero(spread(np.arange(m.n_samples), thinning))
+    kept = np.flatnonzero(is_kept(np.arange(m.n_samples), thinning))
     note = f"Shown: one row in {thinning:,}, evenly spread over the {m.n_samples:,} usable rows; all are fitted."
     part = dataclasses.replace(m.rows(kept), notes=(*m.notes, note))
     return Held(m, m.n_samples, m.n_valid, part, thinning)
 
 
-def spread(index: Int[np.ndarray, " n"], thinning: int) -> Bool[np.ndarray, " n"]:
+def is_kept(index: Int[np.ndarray, " n"], thinning: int) -> Bool[np.ndarray, " n"]:
     """One row in `thinning`, by Weyl's sequence: spread evenly, and nested from one thinning to its double."""
     return index.astype(np.uint64) * np.uint64(_GOLDEN) <= np.uint64((2**64 - 1) // thinning)

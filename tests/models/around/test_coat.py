@@ -13,7 +13,7 @@ from scipy.integrate import quad
 import fitmat as fm
 from fitmat.errors import ModelError
 from fitmat.fitting.coordinates import coordinates
-from fitmat.models.albedo import directional_albedo
+from fitmat.models.albedo import albedo
 from fitmat.models.around.coat import RoughCoat, SmoothCoat, Varnish
 from fitmat.models.base import evaluate_pairs
 from fitmat.models.lobes.lambert import Lambert
@@ -222,9 +222,9 @@ def test_rough_coats_never_reflect_more_than_they_receive(alpha: float) -> None:
     model = Varnish(coat, Lambert(jnp.ones(())))
     for degrees in (0.0, 50.0, 80.0):
         lost = 1 - sum(rough_interface.share(np.cos(np.deg2rad(degrees)), alpha, 1.5, RULE))
-        albedo = directional_albedo(model, np.deg2rad([degrees])).value[0, 0]
-        assert albedo <= 1.001
-        assert albedo == pytest.approx(1 - lost, abs=0.01)
+        reflected = albedo(model, np.deg2rad([degrees])).value[0, 0]
+        assert reflected <= 1.001
+        assert reflected == pytest.approx(1 - lost, abs=0.01)
 
 
 def test_absorption_is_per_channel(hemisphere: Hemisphere) -> None:

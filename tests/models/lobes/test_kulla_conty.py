@@ -12,7 +12,7 @@ import fitmat as fm
 from fitmat.fitting.coordinates import coordinates
 from fitmat.maths.directions import from_angles
 from fitmat.maths.quadrature import cosine_mean
-from fitmat.models.albedo import directional_albedo
+from fitmat.models.albedo import albedo
 from fitmat.models.base import evaluate_pairs
 from fitmat.models.lobes.kulla_conty import KullaConty
 from fitmat.models.lobes.microfacet import Microfacet
@@ -63,8 +63,8 @@ def _white(distribution: str, alpha: float) -> KullaConty:
 @eqx.filter_jit
 def _curve(model: KullaConty, cos: jax.Array) -> tuple[jax.Array, jax.Array]:
     """E at cosines, and E_avg."""
-    albedo = model.white_albedo()
-    return jax.vmap(albedo)(cos), cosine_mean(albedo)
+    white = model.white_albedo()
+    return jax.vmap(white)(cos), cosine_mean(white)
 
 
 def _single(distribution: str, alpha: float, cos: float, cells: int = 700) -> float:
@@ -163,7 +163,7 @@ def test_a_smooth_surface_has_nothing_to_give_back(hemisphere: Hemisphere) -> No
 def test_a_coloured_metal_gets_more_saturated() -> None:
     """Light that met several facets took the colour several times: red over blue of rough gold grows."""
     compensated, bare = (
-        directional_albedo(fm.model(name, f0=np.array([0.95, 0.4]), alpha=0.8, channels=2), np.zeros(1)).value[0]
+        albedo(fm.model(name, f0=np.array([0.95, 0.4]), alpha=0.8, channels=2), np.zeros(1)).value[0]
         for name in ("ggx-kc-schlick", "ggx-schlick")
     )
     assert np.all(compensated > bare)

@@ -1,0 +1,114 @@
+"""Findings: everything that is said of one model of a study, in one noun.
+
+Each part is computed once, here or by whom it is named after; the record, the page and the terminal only read it.
+"""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from fitmat.fitting import priors
+from fitmat.fitting.result import Fit
+from fitmat.judgement.doubts import Doubts, find_doubts
+from fitmat.judgement.identifiability.verdicts import Identifiability
+from fitmat.judgement.metrics import fit_metrics
+from fitmat.judgement.prediction import Section, standardised_residuals
+from fitmat.judgement.predictive_check import PredictiveCheck
+from fitmat.studies.curves import Curve, predict_curves
+from fitmat.uncertainty.posterior import Posterior
+from fitmat.uncertainty.quantities import Quantity, derived, parameters
+from fitmat.uncertainty.second_sampler import SecondOpinion
+
+
+@dataclasses.dataclass(frozen=True)
+class Learnt:
+    """What the data added to one parameter.
+
+    Attributes:
+        name: Of the parameter, with its channel where there are several.
+        symbol: The letter of the literature.
+        prior: What was believed before, as text.
+        narrower: Prior over posterior standard deviation, in the natural coordinate.
+    """
+
+    name: str
+    symbol: str
+    prior: str
+    narrower: float
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Findings:
+    """What a study found of one model.
+
+    Attributes:
+        posterior: Draws of its parameters, around its fit.
+        parameters: As people read them.
+        derived: What follows from them.
+        doubts: What speaks against the intervals.
+        metrics: Name → distance from the measurements.
+        priors: Parameter → what was believed of it before, as text, one for each channel.
+        learnt: What the data added, for each fitted parameter.
+        curves: Along each section of the study.
+        residuals: Of each value, in standard deviations of noise and misfit, rows as in `fit.data`, (n, c).
+        identifiability: What the angles determine; None where the model was not examined one by one.
+        check: Whether the model can make such data; None where that was not asked.
+        second_opinion: Of another sampler; None where that was not asked.
+    """
+
+    posterior: Posterior
+    parameters: tuple[Quantity, ...]
+    derived: tuple[Quantity, ...]
+    doubts: Doubts
+    metrics: Mapping[str, float | None]
+    priors: Mapping[str, tuple[str, ...]]
+    learnt: tuple[Learnt, ...]
+    curves: tuple[Curve, ...]
+    residuals: Float[np.ndarray, "n c"]
+    identifiability: Identifiability | None = None
+    check: PredictiveCheck | None = None
+    second_opinion: SecondOpinion | None = None
+
+    @property
+    def fit(self) -> Fit:
+        """The fit behind the posterior."""
+        return self.posterior.fit
+
+    @property
+    def name(self) -> str:
+        """The model's."""
+        return self.posterior.fit.name
+
+
+def find(posterior: Posterior, along: Sequence[Section]) -> Findings:
+    """What a posterior says of its model.
+
+    Args:
+        posterior: By `sample` or `laplace`.
+        along: Sections of the measurements, along which the model is drawn.
+    """
+    fit = posterior.fit
+    fitted = parameters(posterior)
+    return Findings(
+        posterior=posterior,
+        parameters=tuple(fitted),
+        derived=tuple(derived(posterior, fitted)),
+        doubts=find_doubts(fit),
+        metrics=fit_metrics(fit),
+        priors=priors.words(fit.model, fit.data.prior),
+        learnt=_learnt(posterior),
+        curves=predict_curves(posterior, along),
+        residuals=standardised_residuals(fit),
+    )
+
+
+def _learnt(posterior: Posterior) -> tuple[Learnt, ...]:
+    fit = posterior.fit
+    told = [text for texts in priors.words(fit.model, fit.data.prior).values() for text in texts]
+    symbols = [e.param.symbol for e in fit.entries for _ in range(e.size)]
+    before = priors.natural_sd(fit.model, fit.data.prior)
+    after = fit.coordinates.natural(posterior.values).std(axis=0)
+    rows = zip(fit.coordinates.names, fit.coordinates.places, after, strict=True)
+    return tuple(Learnt(name, symbols[k], told[k], float(before[k] / max(sd, 1e-300))) for name, k, sd in rows)

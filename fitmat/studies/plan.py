@@ -1,0 +1,105 @@
+"""Plan: which models a study fits, and what is known of each beforehand.
+
+It fits nothing; a model or a parameter that does not exist is refused here, before any work.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from fitmat.errors import ModelError
+from fitmat.fitting import known
+from fitmat.fitting.losses import DEFAULT
+from fitmat.fitting.priors import DISCREPANCY
+from fitmat.judgement.choice import every_model
+from fitmat.measurements.samples import Measurements
+from fitmat.models.parameters import entries
+from fitmat.models.registry import LOBES, lobe_names, model, normalised
+
+DEFAULT_MODELS = ("lambert+blinn-phong", "lambert+ggx")
+"""The empirical and the microfacet model of a study that names none."""
+
+EVERY = "all"
+"""Asks for every model that makes sense for the measurements."""
+
+Jobs = Mapping[str, Mapping[str, Any]]
+"""Model name → keyword arguments of `fit`."""
+
+_BESIDE = {DISCREPANCY}
+# What has a prior beside the parameters of a model.
+
+
+def model_names(asked: str | Sequence[str], measurements: Measurements) -> list[str]:
+    """Model names, checked, without repeats; "all" for what can be told by the measurements.
+
+    Args:
+        asked: Names, or a text with commas between them.
+        measurements: What will be fitted.
+
+    Raises:
+        ModelError: no name is given, or one is unknown.
+    """
+    if isinstance(asked, str) and asked.strip() == EVERY:
+        return list(every_model(measurements))
+    parts = asked.split(",") if isinstance(asked, str) else asked
+    names = [normalised(part) for part in parts if part.strip()]
+    if not names:
+        raise ModelError("no model given; try --models lambert+blinn-phong,lambert+ggx.")
+    return list(dict.fromkeys(names))
+
+
+def plan(
+    asked: str | Sequence[str],
+    measurements: Measurements,
+    *,
+    fixed: Mapping[str, Any] | None = None,
+    priors: Mapping[str, Any] | None = None,
+    loss: str = DEFAULT.name,
+    masking: str | None = None,
+    ior: str | None = None,
+    tilt: bool = False,
+) -> Jobs:
+    """What `fit` is to be told of each model.
+
+    Args:
+        asked: As in `model_names`.
+        measurements: What will be fitted, or a part that stands for it.
+        fixed: Parameters to hold in every model that has them; at least one must.
+        priors: What is known beforehand, in every model that has the parameter; at least one must.
+        loss: What the fits minimise, by name.
+        masking: Of the microfacet lobes; None for the models' own.
+        ior: Material whose refractive index is held in the models that have one.
+        tilt: Whether the sample's normal may lean.
+
+    Raises:
+        ModelError: a name is unknown, or something given concerns no model.
+    """
+    names = model_names(asked, measurements)
+    prepared = known.prepared(names, measurements, ior=ior, tilt=tilt)
+    having = {name: {e.name for e in entries(model(name))} | _BESIDE for name in prepared}
+    for flag, given in (("--fix", fixed or {}), ("--prior", priors or {})):
+        _refuse_foreign(flag, given, having)
+    masked = [n for n in prepared if any(LOBES[part].has_masking for part in lobe_names(n))]
+    if masking is not None and not masked:
+        raise ModelError(f"--masking {masking}: none of {', '.join(prepared)} has a masking to choose.")
+    return {
+        name: {
+            "fixed": {**held, **_of(fixed, having[name] - _BESIDE)},
+            "priors": _of(priors, having[name]),
+            "loss": loss,
+            **({"masking": masking} if masking is not None and name in masked else {}),
+        }
+        for name, held in prepared.items()
+    }
+
+
+def _of(given: Mapping[str, Any] | None, names: set[str]) -> dict[str, Any]:
+    return {key: value for key, value in (given or {}).items() if key in names}
+
+
+def _refuse_foreign(flag: str, given: Mapping[str, np.ndarray], having: Mapping[str, set[str]]) -> None:
+    for key in given:
+        if not any(key in has for has in having.values()):
+            every = ", ".join(sorted(set().union(*having.values()) - _BESIDE))
+            raise ModelError(f"{flag} {key}: no model of {', '.join(having)} has it; they have {every}.")

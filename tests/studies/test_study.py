@@ -1,0 +1,144 @@
+"""The story of one file: every number computed once, in the order of the work; an interrupt keeps what was done."""
+
+import dataclasses
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fitmat as fm
+from fitmat.errors import FitmatError
+from fitmat.measurements.samples import Measurements
+from fitmat.models.simulation import simulate
+from fitmat.reports import page, terminal
+from fitmat.studies import findings, record
+from fitmat.studies import study as room
+from fitmat.studies.study import DETAILED, Study, judge, study
+from fitmat.uncertainty.posterior import Posterior
+
+NAMES = ("lambert+blinn-phong", "lambert+ggx")
+
+
+@pytest.fixture(scope="module")
+def measurements() -> Measurements:
+    """One channel, three incidences, 51 directions."""
+    truth = fm.model("lambert+ggx", kd=0.3, alpha=0.3)
+    angles = np.deg2rad([20, 45, 70]), np.deg2rad(np.arange(-80, 81, 10))
+    return simulate(truth, *angles, relative_noise=0.02, absolute_noise=1e-3, seed=1)
+
+
+@pytest.fixture(scope="module")
+def studied(measurements: Measurements) -> Study:
+    return study(measurements, NAMES, sampling=False)
+
+
+def test_a_study_holds_one_noun_for_each_model(studied: Study, measurements: Measurements) -> None:
+    assert [found.name for found in studied.findings] == list(NAMES)
+    assert studied.measurements is measurements
+    assert studied.match is not None
+    assert studied.choice is not None
+    assert len(studied.match.imitations) == 8
+    for found in studied.findings:
+        assert found.identifiability is not None
+        assert found.check is not None
+        assert found.second_opinion is None
+        assert len(found.curves) == 3
+        assert [q.name for q in found.parameters] == [*(e.name for e in found.fit.entries), "discrepancy"]
+        assert [learnt.name for learnt in found.learnt] == list(found.fit.coordinates.names)
+        assert found.residuals.shape == found.fit.data.x.shape
+
+
+def test_the_data_narrow_what_they_determine(studied: Study) -> None:
+    """Uniform in ln α over 1e-4 to 1, then known to about a percent: a factor of hundreds."""
+    alpha = next(learnt for learnt in studied.findings[1].learnt if learnt.name == "alpha")
+    found = studied.findings[1].posterior
+    after = np.log(found.values[:, found.fit.coordinates.names.index("alpha")]).std()
+    assert alpha.narrower == pytest.approx(np.log(1e4) / np.sqrt(12.0) / after, rel=1e-9)
+
+
+def test_everything_is_computed_once_and_then_read(
+    measurements: Measurements, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The record, the page and the terminal call none of it, and each runs once for a model."""
+    calls: Counter[str] = Counter()
+
+    def counted(module: Any, name: str) -> None:
+        real = getattr(module, name)
+
+        def call(*arguments: Any, **options: Any) -> Any:
+            calls[name] += 1
+            return real(*arguments, **options)
+
+        monkeypatch.setattr(module, name, call)
+
+    watched = [
+        (findings, "parameters"),
+        (findings, "derived"),
+        (findings, "find_doubts"),
+        (findings, "fit_metrics"),
+        (findings, "predict_curves"),
+        (room, "identify"),
+        (room, "check_predictions"),
+    ]
+    for module, name in watched:
+        counted(module, name)
+    counted(room, "compare")
+    found = study(measurements, NAMES, sampling=False)
+    record.to_dict(found)
+    page.write(tmp_path, found)
+    terminal.show(found, tmp_path)
+    assert calls == {**{name: 2 for _, name in watched}, "compare": 1}
+
+
+def test_progress_names_every_stage(measurements: Measurements) -> None:
+    told: list[str] = []
+    study(measurements, "lambert", seed=1, progress=lambda what, *_: told.append(what))
+    stages = list(dict.fromkeys(told))
+    assert stages == ["fitting lambert", "sampling lambert", "comparing", "examining lambert"]
+
+
+def test_an_interrupt_keeps_what_was_done(measurements: Measurements) -> None:
+    def stop(what: str, done: int, total: int) -> None:
+        if what == "sampling lambert" and done:
+            raise KeyboardInterrupt
+
+    found = study(measurements, "lambert,phong", progress=stop)
+    first, second = found.posteriors
+    assert first.interrupted
+    assert first.diagnostics is not None
+    assert not second.interrupted
+    assert second.diagnostics is None
+
+
+def test_a_missing_second_sampler_is_said_before_any_fit(
+    measurements: Measurements, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "blackjax", None)
+    monkeypatch.setattr(room, "fit_each", lambda *_, **__: pytest.fail("a fit was started"))
+    with pytest.raises(FitmatError, match=r"blackjax, .* install it with pip install 'fitmat\[nuts\]'"):
+        study(measurements, "lambert", second_opinion=True)
+
+
+def test_what_is_unknown_is_refused_before_any_fit(measurements: Measurements, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(room, "fit_each", lambda *_, **__: pytest.fail("a fit was started"))
+    with pytest.raises(FitmatError, match="no lobe 'gxg'"):
+        study(measurements, "gxg")
+
+
+def test_of_many_models_a_few_are_examined_one_by_one(
+    studied: Study, measurements: Measurements, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of the match, then the best."""
+    monkeypatch.setattr(room, "identify", lambda posterior: None)
+    monkeypatch.setattr(room, "check_predictions", lambda posterior, seed: posterior)
+    worse = [dataclasses.replace(studied.posteriors[0]) for _ in range(DETAILED)]
+    posteriors: list[Posterior] = [*worse, *studied.posteriors]
+    found = judge(posteriors, seed=0)
+    assert found.match is not None
+    asked = [f.posterior for f in found.findings if f.check is not None]
+    assert len(asked) == DETAILED
+    assert {found.match.empirical, found.match.microfacet} <= set(asked)
+    assert [f.posterior for f in found.detailed] == asked
