@@ -1,4 +1,4 @@
-"""What every test stands on: float64, compiled programs shared by all workers, reproducible draws, shared directions."""
+"""What every test stands on: float64, compiled programs shared by all workers, reproducible draws, directions."""
 
 import gc
 import os
@@ -24,12 +24,20 @@ _COMPILED = pytest.StashKey[tempfile.TemporaryDirectory[str]]()
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Share one folder of compiled programs between all workers, for this run; its name is inherited from the first."""
+    """Share one folder of compiled programs, for this run, between all workers and the processes that tests start.
+
+    The first process makes it, the others inherit its name. It is where `fitmat` looks, but not the user's own.
+    FITMAT_COMPILED names a folder that outlives the run.
+    """
     if "FITMAT_COMPILED" not in os.environ:
         folder = tempfile.TemporaryDirectory(prefix="fitmat-tests-", ignore_cleanup_errors=True)
         config.stash[_COMPILED] = folder
         os.environ["FITMAT_COMPILED"] = folder.name
-    jax.config.update("jax_compilation_cache_dir", os.environ["FITMAT_COMPILED"])
+    compiled = Path(os.environ["FITMAT_COMPILED"]) / "fitmat" / "compiled"
+    os.environ["XDG_CACHE_HOME"] = os.environ["FITMAT_COMPILED"]
+    os.environ["JAX_COMPILATION_CACHE_DIR"] = str(compiled)
+    os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"
+    jax.config.update("jax_compilation_cache_dir", str(compiled))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 
 

@@ -9,6 +9,7 @@ from nbclient import NotebookClient
 FOLDER = Path(__file__).parents[1] / "notebooks"
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.ipynb")), ids=lambda path: path.stem)
 def test_runs_and_is_stored_clean(path: Path) -> None:
     notebook = nbformat.read(path, as_version=4)

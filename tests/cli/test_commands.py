@@ -57,9 +57,9 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
 
 
 @pytest.fixture(scope="session")
-def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """For subprocesses: their compiled programs are kept apart from the user's."""
-    return os.environ | {"XDG_CACHE_HOME": str(tmp_path_factory.mktemp("cache")), "COLUMNS": "80"}
+def environment() -> dict[str, str]:
+    """For subprocesses."""
+    return os.environ | {"COLUMNS": "80"}
 
 
 def curves(value: Callable[[int, int], float] = lambda i, o: 0.1 + 0.001 * o, theta_o: Any = range(-80, 81, 10)) -> str:
@@ -393,6 +393,7 @@ except SystemExit:
     assert ended.returncode == 0
 
 
+@pytest.mark.study
 def test_default_run_prints_one_object_and_nothing_else(environment, tmp_path):
     path = tmp_path / "sparse.csv"
     path.write_bytes((DATA / "sparse.csv").read_bytes())

@@ -49,6 +49,7 @@ def test_materials_that_do_not_fit(name: str, material: str, message: str) -> No
         of_material(name, material, ("550",))
 
 
+@pytest.mark.study
 def test_with_gold_fixed_only_the_roughness_is_fitted() -> None:
     """Simulated with the literature's numbers; alpha within 4 sd, and the index is not touched."""
     ((name, held),) = of_material("ggx", "Au", ("550",)).items()

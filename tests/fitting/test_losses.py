@@ -81,6 +81,7 @@ def test_an_objective_is_the_one_of_the_literature(made: fm.Measurements, name: 
     np.testing.assert_allclose(ours.values[ours.free], fitted_by_scipy(made, name, ours), rtol=SIX_DIGITS)
 
 
+@pytest.mark.study
 def test_log10_on_a_real_sample_ends_where_curve_fit_does(shared_data: Path) -> None:
     """Black anodise, four incidences out of the plane; the objective is written out above."""
     m = fm.read(shared_data / "ua-loft" / "zemax" / "AnoBlackEC1onAlum.bsdf")
@@ -140,6 +141,7 @@ def test_inferred_noise_is_that_of_the_simulation() -> None:
         assert sd < 0.5 * true
 
 
+@pytest.mark.study
 def test_bad_values_move_robust_losses_less(made: fm.Measurements) -> None:
     """Five values three times too large: the truth stays within 4 sd under t and mixture, not under the Gaussian."""
     value = made.value.copy()

@@ -5,6 +5,7 @@ from typing import Any
 import jax
 import numpy as np
 import pytest
+from selection import always
 
 import fitmat as fm
 from fitmat.fitting.result import Fit
@@ -83,6 +84,10 @@ CASES: dict[str, Case] = {
 are the same code in each, are gone through with isotropic roughness only."""
 
 
+QUICK = ("lambert", "blinn-phong", "ggx", "ashikhmin-shirley-aniso")
+"""Tried in every run: with and without a Fresnel term, isotropic and brushed."""
+
+
 def measured(truth: Any, *, brushed: bool) -> fm.Measurements:
     """In the plane of incidence, or around the normal where the azimuth counts; 2 % noise."""
     azimuths: dict[str, Any] = (
@@ -118,7 +123,7 @@ def test_no_lobe_is_left_out() -> None:
     assert set(LOBES) - set(CASES) <= set(combined)
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", always(QUICK, CASES))
 def test_the_truth_is_recovered(name: str) -> None:
     values, held = CASES[name]
     truth = fm.model(example(name), **values)

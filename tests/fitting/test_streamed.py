@@ -112,11 +112,13 @@ def test_a_large_text_is_fitted_as_in_one_piece(found: Fit, whole: Fit) -> None:
     assert "over the 48,000 rows; all are fitted." in found.measurements.notes[-1]
 
 
+@pytest.mark.study
 def test_a_large_parquet_file_is_fitted_as_in_one_piece(whole: Fit, tmp_path: Path) -> None:
     path = saved(whole.measurements, tmp_path / "gloss.parquet")
     assert_same(streamed.fit_chunks(chunks.scan(path, rows=13_000, part=8_000), MODEL), whole)
 
 
+@pytest.mark.study
 def test_a_far_start_ends_in_the_same_place(scanned: Chunks, found: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps that make things worse are taken back and shortened."""
     costs: list[float] = []
@@ -168,6 +170,7 @@ def coloured(colours: Path) -> Chunks:
     return chunks.scan(colours, rows=3_000, part=1_000)
 
 
+@pytest.mark.study
 def test_a_parameter_on_its_bound_stays_there_and_what_is_held_stays(coloured: Chunks, colours: Path) -> None:
     """The others are then where scipy's simplex finds them with that parameter at its bound."""
     at_bound = streamed.fit_chunks(coloured, "lambert")
@@ -203,6 +206,7 @@ def _climber(scanned: Chunks) -> Any:
     return streamed._File(scanned, noise.scatter(scanned), start, None), streamed._Range(start)
 
 
+@pytest.mark.study
 def test_a_calibration_counts_once(tmp_path: Path) -> None:
     """A prior belongs to the file, not to each block."""
     instrument = Instrument(calibration=0.02)

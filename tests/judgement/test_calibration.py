@@ -111,6 +111,7 @@ def test_too_little_noise_told_is_found_as_too_much_discrepancy() -> None:
     assert wrong.words.startswith("lambert, laplace: NOT calibrated: the posterior is wrong in ")
 
 
+@pytest.mark.study
 def test_too_much_noise_told_is_found_as_too_wide_intervals() -> None:
     """Fits that are told half as much noise again as there was: Gaussian intervals of 68 % cover 86 %."""
     wrong = lambert(1.5)

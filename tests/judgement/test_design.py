@@ -96,6 +96,7 @@ def test_a_filter_is_the_gaussian_posterior() -> None:
     assert logs == pytest.approx(-0.5 * (squares + np.linalg.slogdet(joint)[1]))
 
 
+@pytest.mark.study
 def test_a_blind_file_is_sent_to_an_angle_that_sees(blind: Fit, for_eta: Design) -> None:
     """At normal incidence nothing tells η; near grazing reflectance does. The promise holds whatever the truth is."""
     first = for_eta.proposals[0]
@@ -109,6 +110,7 @@ def test_a_blind_file_is_sent_to_an_angle_that_sees(blind: Fit, for_eta: Design)
         assert for_eta.sd[3] / first.sd_if[k, 3] == pytest.approx(shrinks, rel=HOLDS)
 
 
+@pytest.mark.study
 def test_the_catalogues_truth_is_told_as_promised(blind: Fit, for_eta: Design) -> None:
     first = for_eta.proposals[0]
     promised = np.interp(np.log(1.5), for_eta.truths[::-1, 3], first.sd_if[::-1, 3])
@@ -116,6 +118,7 @@ def test_the_catalogues_truth_is_told_as_promised(blind: Fit, for_eta: Design) -
     assert for_eta.sd[3] / promised == pytest.approx(for_eta.sd[3] / found, rel=HOLDS)
 
 
+@pytest.mark.study
 def test_an_ordinary_file_gains_what_is_promised() -> None:
     m = fm.read(CATALOGUE / "one-curve.csv")
     posterior = fm.laplace(fm.fit(m, "lambert+ggx"), seed=1)
@@ -126,6 +129,7 @@ def test_an_ordinary_file_gains_what_is_promised() -> None:
     assert design.sd[3] == pytest.approx(posterior.fit.covariance[3, 3] ** 0.5 / posterior.fit.values[3], rel=0.05)
 
 
+@pytest.mark.study
 def test_the_match_is_asked_where_the_models_differ(blind: Fit) -> None:
     """By the fitted models alone: |f − f'| over the noise is near its largest at the proposal."""
     rival = fm.fit(blind.measurements, "lambert")
@@ -148,6 +152,7 @@ def test_what_an_instrument_cannot_do_is_left_out(lambert: Fit) -> None:
         assert np.rad2deg(np.arccos((wi * wo).sum(axis=1).max())) > 9.999
 
 
+@pytest.mark.study
 def test_proposals_differ(for_eta: Design) -> None:
     (wi, wo), both = for_eta.candidates.directions(), for_eta.proposals
     assert len(wi) == len(wo) == len(for_eta.gains)

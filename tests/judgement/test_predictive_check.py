@@ -45,12 +45,14 @@ def right() -> list[PredictiveCheck]:
     return [checked(surface(seed)) for seed in range(REPEATS)]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kind", ["largest", "peak", "pattern"])
 def test_p_values_are_uniform_where_the_model_is_right(right: list[PredictiveCheck], kind: str) -> None:
     p = [next(s.p for s in check.statistics if s.kind == kind) for check in right]
     assert stats.kstest(p, "uniform").pvalue > UNIFORM
 
 
+@pytest.mark.study
 def test_right_models_are_seldom_called_wrong(right: list[PredictiveCheck]) -> None:
     assert np.mean([bool(check.failed) for check in right]) <= FALSE_ALARMS
     sides = np.array([s.p for check in right for s in check.statistics if s.kind == "side"])
@@ -59,6 +61,7 @@ def test_right_models_are_seldom_called_wrong(right: list[PredictiveCheck]) -> N
     assert fine.words == f"lambert can make data like these: none of {len(fine.statistics)} checks is surprising."
 
 
+@pytest.mark.study
 def test_the_ranges_shown_hold_what_was_measured(right: list[PredictiveCheck]) -> None:
     """95 % of right models' numbers lie in their ranges, those of peaks replicated apart from their p-values."""
     for kind in ("largest", "peak", "pattern"):

@@ -49,6 +49,7 @@ def test_zeros_below_the_horizon_are_no_data(black_anodise) -> None:
     assert zemax.masked["0 below the horizon, which the format writes for no datum"] == 134
 
 
+@pytest.mark.study
 def test_two_formats_of_one_sample_give_the_same_parameters(black_anodise) -> None:
     """Where they hold the same directions: elsewhere a model that misses both by 7 σ depends on which they are."""
     zemax, fred = black_anodise
@@ -65,6 +66,7 @@ def test_two_formats_of_one_sample_give_the_same_parameters(black_anodise) -> No
     assert np.max(np.abs(fits[0].values - fits[1].values) / spread) < JOINT
 
 
+@pytest.mark.study
 def test_the_off_specular_peak_is_seen_and_said(black_anodise) -> None:
     """At 50° the sample shines brightest beyond the mirror direction; a round lobe in it leaves positive residuals."""
     zemax = black_anodise[0]

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from selection import always
 
 import fitmat as fm
 from fitmat._types import Scalar, Spectrum, Vec3
@@ -31,7 +32,10 @@ TRIED = [n for n, lobe in LOBES.items() if not (lobe.fresnel_suffix(n) and ("-an
 """Fresnel terms are the same code in every lobe: tried with isotropic roughness and without compensation only. All
 combinations are measured by `fitmat models --check`."""
 
-FAMILIES = pytest.mark.parametrize("name", [*(laws.example(name) for name in PLAIN), *SUMS])
+QUICK = {"lambert", "blinn-phong", "ward", "cook-torrance", "ggx", "beckmann-schlick", "lambert+ggx-schlick", "abg"}
+"""Tried in every run; the others, some of which take seconds to compile, in the study. A model is `example(lobe)`."""
+
+FAMILIES = pytest.mark.parametrize("name", always(QUICK, [*(laws.example(name) for name in PLAIN), *SUMS]))
 
 EXACT = 1e-10
 """Relative; the order of additions differs, and a sharp lobe multiplies their rounding, 1e-16, by 1/alpha."""
@@ -63,19 +67,19 @@ def findings(name: str) -> dict[str, laws.Finding]:
 
 
 @pytest.mark.parametrize("law", ["positive", "reciprocal", "energy", "gradient"])
-@pytest.mark.parametrize("name", TRIED)
+@pytest.mark.parametrize("name", always(QUICK, TRIED))
 def test_laws_hold_where_they_are_not_declared_broken(name: str, law: str) -> None:
     """Over parameters drawn within their bounds; a declared exception must be seen broken."""
     found = findings(name)[law]
     assert found.holds == (law not in LOBES[name].breaks), found
 
 
-@pytest.mark.parametrize("name", ["lambert", "eon", "ggx-kc", "beckmann-kc"])
+@pytest.mark.parametrize("name", always(QUICK, ["lambert", "eon", "ggx-kc", "beckmann-kc"]))
 def test_nothing_is_lost_in_the_white_furnace(name: str) -> None:
     assert findings(name)["furnace"].holds
 
 
-@pytest.mark.parametrize("name", ["ggx", "beckmann", "cook-torrance"])
+@pytest.mark.parametrize("name", always(QUICK, ["ggx", "beckmann", "cook-torrance"]))
 def test_single_scattering_is_no_white_furnace(name: str) -> None:
     assert not findings(name)["furnace"].holds
 

@@ -309,6 +309,7 @@ def test_fixed_parameters_are_not_saved_but_stay_in_the_draws(tmp_path: Path) ->
     assert held.description()["units"] == "{}"
 
 
+@pytest.mark.study
 def test_intervals_cover_the_truth() -> None:
     """emcee's 95 % intervals of all four parameters, over files that differ by their noise alone."""
     truth, covered = np.array(list(TRUTH.values())), np.zeros(4)

@@ -33,8 +33,6 @@ from pathlib import Path
 sys.path.insert(0, {tests!r})
 import jax
 jax.config.update("jax_enable_x64", True)
-jax.config.update("jax_compilation_cache_dir", {folder!r} + "-compiled")
-jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 import test_checkpoint as t
 t.fm.sample(t.fitted(), seed=1, max_steps=t.STEPS, checkpoint=Path({folder!r}), progress=lambda *_: time.sleep(0.2))
 """

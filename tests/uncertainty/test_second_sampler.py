@@ -48,6 +48,7 @@ def test_both_samplers_find_the_truncated_gaussian(exact: SecondOpinion) -> None
     assert exact.verdict == "agree"
 
 
+@pytest.mark.study
 def test_nuts_agrees_with_emcee_where_the_discrepancy_is_inferred(inferred: SecondOpinion) -> None:
     assert [a.name for a in inferred.agreements] == ["kd", "discrepancy"]
     assert inferred.verdict == "agree"

@@ -77,6 +77,7 @@ def test_the_cone_rule_has_the_variance_of_two_discs(source: float, receiver: fl
     np.testing.assert_allclose(offset.T * weights @ offset, expected, rtol=1e-3, atol=1e-9)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("alpha", [0.02, 0.03])
 def test_wide_apertures_do_not_bias_alpha(alpha: float) -> None:
     """Mirror-like data averaged by brute force, read with 1.5° receiver and 0.5° source; then without saying so."""
@@ -101,6 +102,7 @@ def deviations(fit: fm.Fit, **truth: float) -> list[float]:
     return [float((fit.values[places[name]] - true) / sd[places[name]]) for name, true in truth.items()]
 
 
+@pytest.mark.study
 def test_a_shared_calibration_error_is_covered() -> None:
     """95 % intervals of kd over 200 repeats with a 3 % scale error: with the correlated term, and without it."""
     truth, instrument = fm.model("lambert+ggx", kd=0.3, alpha=0.2, eta=1.5), Instrument(calibration=0.03)
@@ -139,6 +141,7 @@ def test_a_calibration_prior_is_sampled_as_it_is_given() -> None:
     assert logs.std() == pytest.approx(0.1, rel=0.05)
 
 
+@pytest.mark.study
 def test_the_match_is_of_the_surfaces_and_not_of_the_instrument() -> None:
     truth = fm.model("lambert+blinn-phong", kd=0.3, ks=0.2, exponent=100.0)
     m = fm.simulate(truth, THETA_I, THETA_O, relative_noise=0.01, absolute_noise=1e-4, seed=0)

@@ -140,6 +140,7 @@ def _estimate(found: Fit, name: str) -> tuple[float, float]:
     return float(found.values[place]), float(np.sqrt(found.covariance[place, place]))
 
 
+@pytest.mark.study
 def test_a_fit_finds_the_tilt_and_alpha_which_ignoring_it_biases(tilted: fm.Measurements) -> None:
     """A level model smears the lobe over both planes: alpha is off by several σ of the right fit, and it misfits."""
     found, level = (fm.fit(tilted, name, fixed={"ks": 1.0}) for name in ("tilt-over-lambert+ggx", "lambert+ggx"))

@@ -133,6 +133,7 @@ def test_white_mirrors_agree_with_heitzs_program(estimator: Estimator, order: in
             _against_heitz(found, 1, rows)
 
 
+@pytest.mark.study
 def test_dielectrics_agree_with_heitzs_program() -> None:
     """Reflected BRDF, light that went through facets and came back included, and albedo; GGX 0.5, Beckmann 0.8."""
     surfaces = _surfaces(0, dielectric=True)
@@ -167,6 +168,7 @@ def test_first_order_is_the_height_correlated_microfacet_lobe(distribution: Abst
         _agree(evaluate_walk(surface, WI, WO, samples=SAMPLES, seed=1, order=1), exact)
 
 
+@pytest.mark.study
 @BOTH
 def test_white_furnace(distribution: AbstractDistribution) -> None:
     """∫ f c_o dω_o = 1 for F = 1: values to ω_o, integrated by a rule that knows nothing of paths.
@@ -227,6 +229,7 @@ def test_without_depths_the_mean_is_the_walks(distribution: AbstractDistribution
         assert np.median(exact.standard_error / np.maximum(walked.standard_error, 1e-300)) < 0.75
 
 
+@pytest.mark.study
 def test_standard_errors_are_the_scatter_of_independent_runs() -> None:
     """8 seeds: their variance against the squares of the stated errors, averaged over pairs and channels."""
     surface = Surface(GGX(), (0.5, 0.5), Mirrors())
