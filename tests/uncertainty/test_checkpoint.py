@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+import types
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -94,11 +95,14 @@ def steps(fit: Fit, folder: Path) -> int:
     return resumable_steps(fit, seed=1, max_steps=STEPS, checkpoint=folder)
 
 
-def test_a_run_killed_twice_ends_with_the_same_chain(fit: Fit, whole: Posterior, tmp_path: Path) -> None:
-    """Kill −9 of two processes; the third start, here, ends with the chain of a run that nobody killed."""
+@pytest.mark.parametrize("kills", [(2,), pytest.param((1, 3), marks=pytest.mark.study)], ids=["once", "twice"])
+def test_a_killed_run_ends_with_the_same_chain(
+    fit: Fit, whole: Posterior, tmp_path: Path, kills: tuple[int, ...]
+) -> None:
+    """Kill −9 of processes after so many parts; the last start, here, ends with the chain that nobody killed."""
     folder = tmp_path / "kept"
     code = CHILD.format(tests=str(Path(__file__).parent), folder=str(folder))
-    for wanted in (1, 3):
+    for wanted in kills:
         process = subprocess.Popen([sys.executable, "-c", code])
         end = time.monotonic() + PATIENCE
         while len(parts(folder)) < wanted and process.poll() is None and time.monotonic() < end:
@@ -207,6 +211,8 @@ def test_a_slow_disk_gets_fewer_parts(
     fit: Fit, whole: Posterior, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each write takes 0.3 s, so that the next would be due after 15 s: the first and the last alone."""
-    monkeypatch.setattr(checkpoint.os, "fsync", lambda _: time.sleep(0.3))
+    clock = [0.0]
+    monkeypatch.setattr(checkpoint, "time", types.SimpleNamespace(monotonic=lambda: clock[0]))
+    monkeypatch.setattr(checkpoint.os, "fsync", lambda _: clock.append(clock.pop() + 0.3))
     assert_same(run(fit, tmp_path), whole)
     assert [part.name for part in parts(tmp_path)] == ["00000050.part", "00000250.part"]
