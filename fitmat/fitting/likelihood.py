@@ -21,6 +21,7 @@ from fitmat._types import Directions, Samples, Scalar
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.losses import DEFAULT, Loss
 from fitmat.fitting.stabilising import spread
+from fitmat.maths.arrays import library
 from fitmat.measurements.noise import Noise, levels
 from fitmat.measurements.samples import Measurements
 from fitmat.models.around.noise import Noisy
@@ -126,7 +127,16 @@ def residuals_from(measured: Samples, model: AbstractBRDF, data: Data, s: Scalar
     if data.loss.infers_noise:
         noise = inferred_noise(model, data)
         measured = data.loss.transform(data.x, noise, data.kappa, s)
+    return _apart(measured, predicted, noise, data, s)
+
+
+def _apart(measured: Any, predicted: Any, noise: Any, data: Data, s: Any) -> Any:
     return data.weight * data.loss.shrink(measured - data.loss.transform(predicted, noise, data.kappa, s))
+
+
+def misfits(predicted: Any, noise: Any, data: Data, s: Any) -> Any:
+    """`residuals` of given model values f κ and noise σ κ, (…, n, c); of NumPy arrays where `data` holds such."""
+    return _apart(data.loss.transform(data.x, noise, data.kappa, s), predicted, noise, data, s)
 
 
 def inferred_noise(model: AbstractBRDF, data: Data) -> Samples:
@@ -190,17 +200,21 @@ def log_likelihood(model: AbstractBRDF, data: Data, s: Scalar) -> Scalar:
     return -0.5 * jnp.vdot(r, r) - jnp.vdot(data.weight, _log_spread(model, data, s))
 
 
-def log_pointwise(model: AbstractBRDF, data: Data, s: Scalar) -> Samples:
-    """The terms of `log_likelihood`, one for each value, (n, c); of no meaning where a value is masked."""
-    return -0.5 * residuals(model, data, s) ** 2 - _log_spread(model, data, s)
+def log_pointwise(predicted: Any, noise: Any, data: Data, s: Any) -> Any:
+    """The terms of `log_likelihood`, one for each value, of what `misfits` takes; of no meaning where one is masked."""
+    return -0.5 * misfits(predicted, noise, data, s) ** 2 - _log_width(noise, data, s)
 
 
 def _log_spread(model: AbstractBRDF, data: Data, s: Scalar) -> Samples:
     """−ln of the density of a residual of 0, in sr, (n, c); 0 of an objective."""
+    return _log_width(inferred_noise(model, data) if data.loss.infers_noise else data.noise, data, s)
+
+
+def _log_width(noise: Any, data: Data, s: Any) -> Any:
+    xp = library(noise, data.x)
     if data.loss.spread is None:
-        return jnp.zeros_like(data.x)
-    noise = inferred_noise(model, data) if data.loss.infers_noise else data.noise
-    return jnp.log(data.loss.spread(data.x, noise, data.kappa, s)) - jnp.log(data.kappa) - data.loss.log_peak
+        return xp.zeros_like(data.x)
+    return xp.log(data.loss.spread(data.x, noise, data.kappa, s)) - xp.log(data.kappa) - data.loss.log_peak
 
 
 def best_discrepancy(predicted: Samples, data: Data, start: Scalar) -> Scalar:

@@ -8,18 +8,19 @@ Formulas only: nothing is fitted here.
 import dataclasses
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
+from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
 
 from fitmat.errors import ModelError
 from fitmat.fitting.stabilising import spread, stabilised
+from fitmat.maths.arrays import library
 from fitmat.measurements.samples import Measurements
 from fitmat.models.metrics import DARKEST, above_minus_one, cube_root, log_radiance, within
 
-Transform = Callable[[Array, Array, Array, Array], Array]
-"""(x, noise, kappa, s) → T(x): x = f κ, noise = σ κ, kappa = cosθ_i, s the discrepancy; elementwise."""
+Transform = Callable[[Any, Any, Any, Any], Any]
+"""(x, noise, kappa, s) → T(x): x = f κ, noise = σ κ, kappa = cosθ_i, s the discrepancy; elementwise,
+of JAX or NumPy arrays."""
 
 T_DOF = 4.0
 """Degrees of freedom of "student-t": heavy tails with a finite variance (Lange, Little & Taylor 1989 suggest 4)."""
@@ -30,7 +31,7 @@ BAD_SHARE, BAD_SPREAD = 0.05, 10.0
 _GAUSSIAN_PEAK = -0.5 * np.log(2.0 * np.pi)
 
 
-def _same(r: Array) -> Array:
+def _same(r: Any) -> Any:
     return r
 
 
@@ -58,7 +59,7 @@ class Loss:
     source: str
     transform: Transform
     spread: Transform | None = None
-    shrink: Callable[[Array], Array] = _same
+    shrink: Callable[[Any], Any] = _same
     log_peak: float = _GAUSSIAN_PEAK
     infers: str = ""
     usable: Callable[[Measurements], np.ndarray] | None = None
@@ -95,47 +96,47 @@ class Loss:
         return not (self.robust or self.infers_noise)
 
 
-def _default(x: Array, noise: Array, kappa: Array, s: Array) -> Array:
+def _default(x: Any, noise: Any, kappa: Any, s: Any) -> Any:
     del kappa
     return stabilised(x, noise, s)
 
 
-def _default_spread(x: Array, noise: Array, kappa: Array, s: Array) -> Array:
+def _default_spread(x: Any, noise: Any, kappa: Any, s: Any) -> Any:
     del kappa
     return spread(x, noise, s)
 
 
-def _gaussian(x: Array, noise: Array, kappa: Array, s: Array) -> Array:
+def _gaussian(x: Any, noise: Any, kappa: Any, s: Any) -> Any:
     del kappa, s
     return x / noise
 
 
-def _gaussian_spread(x: Array, noise: Array, kappa: Array, s: Array) -> Array:
+def _gaussian_spread(x: Any, noise: Any, kappa: Any, s: Any) -> Any:
     del kappa, s
-    return jnp.broadcast_to(noise, jnp.shape(x))
+    return library(noise, x).broadcast_to(noise, np.broadcast_shapes(np.shape(x), np.shape(noise)))
 
 
-def _student(r: Array) -> Array:
+def _student(r: Any) -> Any:
     """sign(r) √((ν + 1) ln(1 + r²/ν)), smooth at 0."""
-    u = r**2 / T_DOF
+    xp, u = library(r), r**2 / T_DOF
     small = u < 1e-8
-    safe = jnp.where(small, 1.0, u)
-    return r * jnp.sqrt((T_DOF + 1.0) / T_DOF * jnp.where(small, 1.0 - 0.5 * u, jnp.log1p(safe) / safe))
+    safe = xp.where(small, 1.0, u)
+    return r * xp.sqrt((T_DOF + 1.0) / T_DOF * xp.where(small, 1.0 - 0.5 * u, xp.log1p(safe) / safe))
 
 
 _STUDENT_PEAK = float(np.log(0.75 / 2.0))
 # Γ(5/2)/(Γ(2) √(4π)) = 3/8, the density of t with 4 degrees of freedom at 0.
 
 
-def _mixed(r: Array) -> Array:
+def _mixed(r: Any) -> Any:
     """sign(r) √(2(L(r) − L(0))), −L the log density of the mixture of two Gaussians, smooth at 0."""
-    square = r**2
+    xp, square = library(r), r**2
     good, bad = 1.0 - BAD_SHARE, BAD_SHARE / BAD_SPREAD
     small = square < 1e-8
-    safe = jnp.where(small, 1.0, square)
-    logs = jnp.logaddexp(jnp.log(good) - 0.5 * safe, jnp.log(bad) - 0.5 * safe / BAD_SPREAD**2)
+    safe = xp.where(small, 1.0, square)
+    logs = xp.logaddexp(np.log(good) - 0.5 * safe, np.log(bad) - 0.5 * safe / BAD_SPREAD**2)
     curvature = (good + bad / BAD_SPREAD**2) / (good + bad)
-    return r * jnp.sqrt(jnp.where(small, curvature, 2.0 * (jnp.log(good + bad) - logs) / safe))
+    return r * xp.sqrt(xp.where(small, curvature, 2.0 * (np.log(good + bad) - logs) / safe))
 
 
 _MIXED_PEAK = float(np.log((1.0 - BAD_SHARE + BAD_SHARE / BAD_SPREAD) / np.sqrt(2.0 * np.pi)))
@@ -148,27 +149,27 @@ def bad_probability(r: np.ndarray) -> np.ndarray:
     return 1.0 / (1.0 + np.exp(np.clip(good - bad, -700.0, 700.0)))
 
 
-def _log10(x: Array, noise: Array, kappa: Array, s: Array) -> Array:
+def _log10(x: Any, noise: Any, kappa: Any, s: Any) -> Any:
     del noise, s
-    return jnp.log10(jnp.maximum(x / kappa, DARKEST))
+    return library(x).log10(library(x).maximum(x / kappa, DARKEST))
 
 
-def _log1p(x: Array, noise: Array, kappa: Array, s: Array) -> Array:
+def _log1p(x: Any, noise: Any, kappa: Any, s: Any) -> Any:
     del noise, kappa, s
     return log_radiance(x)
 
 
-def _cube_root(x: Array, noise: Array, kappa: Array, s: Array) -> Array:
+def _cube_root(x: Any, noise: Any, kappa: Any, s: Any) -> Any:
     del noise, kappa, s
     return cube_root(x)
 
 
-def _radiance(x: Array, noise: Array, kappa: Array, s: Array) -> Array:
+def _radiance(x: Any, noise: Any, kappa: Any, s: Any) -> Any:
     del noise, kappa, s
     return x
 
 
-def _brdf(x: Array, noise: Array, kappa: Array, s: Array) -> Array:
+def _brdf(x: Any, noise: Any, kappa: Any, s: Any) -> Any:
     del noise, s
     return x / kappa
 
@@ -176,8 +177,9 @@ def _brdf(x: Array, noise: Array, kappa: Array, s: Array) -> Array:
 def _by_ring(of: Transform) -> Transform:
     """Weighted with sinθ_i."""
 
-    def weighted(x: Array, noise: Array, kappa: Array, s: Array) -> Array:
-        return jnp.sqrt(jnp.sqrt(jnp.maximum(1.0 - kappa**2, 0.0))) * of(x, noise, kappa, s)
+    def weighted(x: Any, noise: Any, kappa: Any, s: Any) -> Any:
+        xp = library(kappa)
+        return xp.sqrt(xp.sqrt(xp.maximum(1.0 - kappa**2, 0.0))) * of(x, noise, kappa, s)
 
     return weighted
 

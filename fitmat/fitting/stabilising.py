@@ -16,6 +16,8 @@ import numpy as np
 from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array
 
+from fitmat.maths.arrays import library
+
 
 def _near_shape() -> np.ndarray:
     """Coefficients, highest first, of 3(q − atan q)/q³ as a polynomial in 2q² − 1 for 0 ≤ q² ≤ 1, exact to 1e-15.
@@ -35,77 +37,86 @@ def _near_shape() -> np.ndarray:
 _NEAR = _near_shape()
 
 
-@jax.custom_jvp
-def _shape(q2: Array) -> Array:
+def _shape(q2: Any) -> Any:
     """3(q − atan q)/q³ as a function of q²; for q > 1 by atan q = π/2 − atan(1/q), with the same polynomial."""
+    xp = library(q2)
     near = q2 <= 1.0
-    v2 = 1.0 / jnp.where(near, 1.0, q2)
-    v = jnp.sqrt(v2)
-    polynomial = jnp.polyval(jnp.asarray(_NEAR), 2.0 * jnp.where(near, q2, v2) - 1.0)
-    far = 3.0 * v**3 * (1.0 / v - jnp.pi / 2.0 + v * (1.0 - v2 * polynomial / 3.0))
-    return jnp.where(near, polynomial, far)
+    v2 = 1.0 / xp.where(near, 1.0, q2)
+    v = xp.sqrt(v2)
+    polynomial = xp.polyval(xp.asarray(_NEAR), 2.0 * xp.where(near, q2, v2) - 1.0)
+    far = 3.0 * v**3 * (1.0 / v - np.pi / 2.0 + v * (1.0 - v2 * polynomial / 3.0))
+    return xp.where(near, polynomial, far)
 
 
-@_shape.defjvp
+_traced_shape = jax.custom_jvp(_shape)
+
+
+@_traced_shape.defjvp
 def _shape_jvp(primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
     """g′(w) = 3(1/(1 + w) − g)/(2w), which follows from z′(x) = 1/(a + d); by its power series where that cancels."""
     (w,), (w_dot,) = primals, tangents
-    g = _shape(w)
+    g = _traced_shape(w)
     small = w < 1e-3
     series = -3.0 / 5.0 + w * (6.0 / 7.0 - w * (1.0 - w * 12.0 / 11.0))
     safe = jnp.where(small, 1.0, w)
     return g, jnp.where(small, series, 1.5 / safe * (1.0 / (1.0 + safe) - g)) * w_dot
 
 
-def _two_thirds(x: Array) -> Array:
+def _two_thirds(x: Any) -> Any:
     """|x|^(2/3), by exp and log: several times faster than a cube root; 0 at 0."""
-    return jnp.exp(jnp.log(jnp.maximum(x * x, 1e-300)) / 3.0)
+    xp = library(x)
+    return xp.exp(xp.log(xp.maximum(x * x, 1e-300)) / 3.0)
 
 
-def spread(x: Array, noise: Array, s: Array) -> Array:
+def spread(x: Any, noise: Any, s: Any) -> Any:
     """a + 3 s |x|^(2/3): the standard deviation of a measurement of x."""
     return noise + 3.0 * s * _two_thirds(x)
 
 
+def stabilised(x: Any, noise: Any, s: Any) -> Any:
+    """z(x), the module's transform; its derivative in x is 1/(a + 3 s |x|^(2/3)), finite everywhere.
+
+    JAX and NumPy arrays alike, as the others here.
+    """
+    if library(x, noise, s) is np:
+        return x / noise * _shape(3.0 * s * _two_thirds(x) / noise)
+    return _traced(x, noise, s)
+
+
 @jax.custom_jvp
-def stabilised(x: Array, noise: Array, s: Array) -> Array:
-    """z(x), the module's transform; its derivative in x is 1/(a + 3 s |x|^(2/3)), finite everywhere."""
-    return x / noise * _shape(3.0 * s * _two_thirds(x) / noise)
+def _traced(x: Array, noise: Array, s: Array) -> Array:
+    return x / noise * _traced_shape(3.0 * s * _two_thirds(x) / noise)
 
 
 def _stabilised_jvp(primals: tuple, tangents: tuple) -> tuple[Array, Any]:
     x, noise, s = primals
     x_dot, _, s_dot = tangents
-    value, change = stabilised(x, noise, s), jnp.zeros(())
+    value, change = _traced(x, noise, s), jnp.zeros(())
     if not isinstance(x_dot, SymbolicZero):
         change = x_dot / spread(x, noise, s)
     if not isinstance(s_dot, SymbolicZero):
         fixed = _two_thirds(x)
-        change += jax.jvp(lambda t: x / noise * _shape(3.0 * t * fixed / noise), (s,), (s_dot,))[1]
+        change += jax.jvp(lambda t: x / noise * _traced_shape(3.0 * t * fixed / noise), (s,), (s_dot,))[1]
     return value, jnp.broadcast_to(change, value.shape)
 
 
-stabilised.defjvp(_stabilised_jvp, symbolic_zeros=True)
+_traced.defjvp(_stabilised_jvp, symbolic_zeros=True)
 
 
-def from_stabilised(z: Array, noise: Array, s: Array) -> Array:
-    """x with z(x) = z, by bisection in ∛|x|; for predictive bands.
+def from_stabilised(z: Any, noise: Any, s: Any) -> Any:
+    """x with z(x) = z, by Newton's method in u = ∛|x|; for predictive bands.
 
-    Since a + 3 s u² is at least its larger part and at most twice that, ∛|x| lies between the larger of ∛(a|z|) and
-    s|z|, and ∛(2a|z|) + 2s|z|.
+    z(u³) is convex, so that steps from above never pass the root. They begin at ∛(2a|z|) + 2s|z|: since a + 3 s u² is
+    at least its larger part and at most twice that, u is at least the larger of ∛(a|z|) and s|z|.
     """
-    size = jnp.abs(z)
-
-    def halve(_: int, bracket: tuple[Array, Array]) -> tuple[Array, Array]:
-        low, high = bracket
-        middle = 0.5 * (low + high)
-        below = stabilised(middle**3, noise, s) < size
-        return jnp.where(below, middle, low), jnp.where(below, high, middle)
-
-    begin = jnp.maximum(jnp.cbrt(noise * size), s * size), jnp.cbrt(2.0 * noise * size) + 2.0 * s * size
-    low, high = jax.lax.fori_loop(0, HALVINGS, halve, begin)
-    return jnp.sign(z) * (0.5 * (low + high)) ** 3
+    xp = library(z, noise, s)
+    size = xp.abs(z)
+    u = xp.cbrt(2.0 * noise * size) + 2.0 * s * size
+    for _ in range(STEPS):
+        slope = 3.0 * u * u / (noise + 3.0 * s * u * u)
+        u = u - (stabilised(u**3, noise, s) - size) / xp.maximum(slope, 1e-300)
+    return xp.sign(z) * u**3
 
 
-HALVINGS = 50
-"""Bisections of a bracket whose ends are within a factor of 3.3 of each other: ∛x to 15 digits."""
+STEPS = 10
+"""Newton's, from at most 3.3 times the root: ∛x to 15 digits."""

@@ -10,26 +10,27 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Bool, Float, Int
+from jaxtyping import ArrayLike, Bool, Float, Int
 from scipy.stats import binomtest
 
 from fitmat._types import Progress
 from fitmat.errors import FitmatError
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.fitting import fit
-from fitmat.fitting.likelihood import Data, log_likelihood, mapped
+from fitmat.fitting.likelihood import log_pointwise
 from fitmat.fitting.priors import DISCREPANCY, draw, prepared
-from fitmat.fitting.stabilising import from_stabilised, stabilised
+from fitmat.fitting.result import Fit
+from fitmat.judgement.multiplicity import adjusted_for_many
+from fitmat.judgement.prediction import as_numpy, predictions, replicated
 from fitmat.judgement.uniformity import p_values
 from fitmat.measurements.instrument import IDEAL
 from fitmat.measurements.samples import Measurements
-from fitmat.models.base import AbstractBRDF, evaluate, evaluate_pairs
+from fitmat.models.base import AbstractBRDF, evaluate
 from fitmat.models.parameters import entries, vector, with_vector
 from fitmat.models.registry import model
+from fitmat.models.values import values
 from fitmat.uncertainty.chains import sample
 from fitmat.uncertainty.laplace import laplace
 from fitmat.uncertainty.posterior import Posterior
@@ -81,7 +82,8 @@ class Calibration:
 
     def faults(self, family: float = FAMILY) -> tuple[str, ...]:
         """Quantities whose ranks are not uniform, a right program having any with probability `family` at most."""
-        return tuple(self.quantities[k] for k in rejected(self.p_values(), family))
+        p = self.p_values()
+        return tuple(self.quantities[k] for k in np.argsort(p) if adjusted_for_many(p)[k] <= family)
 
     @property
     def words(self) -> str:
@@ -100,18 +102,6 @@ class Calibration:
             f"smallest p of {len(self.quantities)} tests of uniformity {smallest:.2g}, family-wise level {FAMILY:g}; "
             f"{len(self.trusted) - count} posteriors that do not trust themselves left out."
         )
-
-
-def rejected(p: Float[np.ndarray, " q"], family: float) -> list[int]:
-    """Which hypotheses fall under Holm's step-down procedure (1979), most improbable first.
-
-    Args:
-        p: p-values.
-        family: Probability of any wrong rejection.
-    """
-    order = np.argsort(p)
-    falls = p[order] <= family / (len(p) - np.arange(len(p)))
-    return order[: len(p) if falls.all() else int(np.argmin(falls))].tolist()
 
 
 def coverage_limits(count: int, hits: int) -> tuple[float, float]:
@@ -156,11 +146,10 @@ def calibrate(
     template = _centre(model(name, channels=len(geometry.channels)), priors)
     sigma = np.hypot(noise[1], noise[0] * evaluate(template, geometry.wi, geometry.wo))
     free, prior = coordinates(template).index, prepared(template, IDEAL, priors)
-    values, s = draw(template, prior, free, simulations, rng)
+    truths, s = draw(template, prior, free, simulations, rng)
     kappa, normal = geometry.wi[:, 2:3], rng.normal(size=(simulations, *sigma.shape))
-    where = tuple(jnp.asarray(part) for part in (geometry.wi, geometry.wo, sigma * kappa, kappa))
-    truths = (jnp.asarray(values), jnp.asarray(s), jnp.asarray(normal))
-    measured = np.asarray(_simulated(template, where, truths)) / kappa
+    exact = values(template, truths, geometry.wi, geometry.wo) * kappa
+    measured = replicated(exact, sigma * kappa, s[:, None, None], normal) / kappa
     plan = dataclasses.replace(
         geometry, sigma=told * sigma, valid=np.ones(sigma.shape, bool), source=f"simulated {name}", instrument=IDEAL
     )
@@ -171,7 +160,7 @@ def calibrate(
             raise FitmatError(f"simulation {k} of {name}: the fit ended {fitted.result}.")
         number = int(rng.integers(2**31))
         posterior = sample(fitted, seed=number) if method == "emcee" else laplace(fitted, seed=number)
-        found.append(_placed(posterior, values[k], s[k]))
+        found.append(_placed(posterior, truths[k], s[k]))
         if progress is not None:
             progress(f"calibrating {name}", k + 1, simulations)
     ranks, covered, trusted = (np.stack(part) for part in zip(*found, strict=True))
@@ -200,33 +189,18 @@ def _quantities(template: AbstractBRDF) -> tuple[str, ...]:
     return (*names, DISCREPANCY, LOG_LIKELIHOOD)
 
 
-@eqx.filter_jit
-def _simulated(
-    template: AbstractBRDF, where: tuple[Array, ...], truths: tuple[Array, Array, Array]
-) -> Float[Array, "m n c"]:
-    """y κ of every truth, as the likelihood says: z(y κ) = z(f κ) + N(0, 1)."""
-    wi, wo, noise, kappa = where
-
-    def one(item: tuple[Array, Array, Array]) -> Array:
-        value, s, e = item
-        exact = evaluate_pairs(with_vector(template, value), wi, wo) * kappa
-        return from_stabilised(stabilised(exact, noise, s) + e, noise, s)
-
-    return jax.lax.map(one, truths)
-
-
 def _placed(posterior: Posterior, truth: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray, np.bool_]:
     """Ranks (q,), coverage (levels, q − 1) and trust of one posterior."""
     every = np.column_stack([posterior.values, posterior.discrepancy])
     few, true = np.column_stack(posterior.thinned(DRAWS)), np.append(truth, s)
-    likelihood = np.asarray(
-        _log_likelihoods(posterior.fit.model, posterior.fit.data, jnp.asarray(np.vstack([true, few])))
-    )
+    likelihood = _log_likelihoods(posterior.fit, np.vstack([true, few]))
     below = np.append((few < true).sum(axis=0), (likelihood[1:] < likelihood[0]).sum())
     ends = [np.quantile(every, [(1 - level) / 2, (1 + level) / 2], axis=0) for level in LEVELS]
     return below, np.stack([(low <= true) & (true <= high) for low, high in ends]), np.bool_(posterior.exact)
 
 
-@eqx.filter_jit
-def _log_likelihoods(template: AbstractBRDF, data: Data, points: Array) -> Float[Array, " m"]:
-    return mapped(lambda x: log_likelihood(with_vector(template, x[:-1]), data, x[-1]), points)
+def _log_likelihoods(fit: Fit, points: np.ndarray) -> Float[np.ndarray, " m"]:
+    data, found = as_numpy(fit.data), np.empty(len(points))
+    for part, x, noise, spread in predictions(fit, points[:, :-1], points[:, -1]):
+        found[part] = (data.weight * log_pointwise(x, noise, data, spread)).sum(axis=(1, 2))
+    return found

@@ -5,14 +5,11 @@ It compares no models; `choice` does.
 
 import dataclasses
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from fitmat.fitting.likelihood import Data, log_pointwise, mapped
-from fitmat.models.base import AbstractBRDF
-from fitmat.models.parameters import with_vector
+from fitmat.fitting.likelihood import log_pointwise
+from fitmat.judgement.prediction import as_numpy, predictions
 from fitmat.uncertainty.posterior import GOOD_PARETO, Posterior
 
 DRAWS = 1000
@@ -49,21 +46,13 @@ def weigh(posterior: Posterior) -> Evidence | None:
     used = np.asarray(fit.data.weight) > 0
     if int(used.sum()) > MOST_LEFT_OUT or fit.n_values > MOST_LEFT_OUT:
         return None
-    values, s = posterior.thinned(DRAWS)
-    logs = np.asarray(_pointwise(fit.model, fit.data, jnp.asarray(values), jnp.asarray(s)))[:, used]
+    draws, s = posterior.thinned(DRAWS)
+    data, logs = as_numpy(fit.data), np.empty((len(s), int(used.sum())))
+    for part, x, noise, spread in predictions(fit, draws, s):
+        logs[part] = log_pointwise(x, noise, data, spread)[:, used]
     d = posterior.diagnostics
     independent = 1.0 if d is None else float(np.clip(np.nanmin(d.ess) / len(s), 0.01, 1.0))
     elpd, k, p_loo = array_stats.loo(logs.T[:, None, :], r_eff=independent)
     elpd, k = np.asarray(elpd), np.asarray(k)
     spread = float(np.sqrt(elpd.size) * elpd.std())
     return Evidence(float(elpd.sum()), spread, float(np.sum(p_loo)), float(np.mean(k > GOOD_PARETO)), elpd)
-
-
-@eqx.filter_jit
-def _pointwise(template: AbstractBRDF, data: Data, values: Array, s: Array) -> Array:
-    """Log density of every value in sr⁻¹ under every draw, (d, n, c)."""
-
-    def one(draw: tuple[Array, Array]) -> Array:
-        return log_pointwise(with_vector(template, draw[0]), data, draw[1])
-
-    return mapped(one, (values, s))  # pyright: ignore[reportArgumentType]

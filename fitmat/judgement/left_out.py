@@ -9,14 +9,14 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from fitmat.fitting.fitting import refine
-from fitmat.fitting.likelihood import Data, first_discrepancy, mapped, residuals
+from fitmat.fitting.likelihood import first_discrepancy, misfits
 from fitmat.fitting.result import Fit
+from fitmat.judgement.prediction import as_numpy, predictions
 from fitmat.measurements.incidences import incidences
-from fitmat.models.base import AbstractBRDF, evaluate_pairs
-from fitmat.models.parameters import with_vector
+from fitmat.models.metrics import cube_root
 
 MOST_REFITTED = 50_000
 """Values above which nothing is refitted."""
@@ -84,8 +84,7 @@ def leave_incidences_out(fit: Fit) -> LeftOut | None:
     for k, group in enumerate(groups):
         left[k, group.rows] = used[group.rows]
     values, s, settled = _refitted(fit, used - left)
-    found = _errors(fit.model, data, jnp.asarray(values), jnp.asarray(s), jnp.asarray(left))
-    cube, z = (np.sqrt(np.asarray(part)) for part in found)
+    cube, z = _errors(fit, values, s, left)
     promised = fit.loss.posterior
     angles = np.array([g.theta_i_deg for g in groups])
     count = left.sum(axis=(1, 2))
@@ -106,15 +105,11 @@ def _refitted(fit: Fit, weights: Float[np.ndarray, "k n c"]) -> tuple[np.ndarray
     return values, s, settled
 
 
-@eqx.filter_jit
-def _errors(template: AbstractBRDF, data: Data, values: Array, s: Array, left: Array) -> tuple[Array, Array]:
-    """Mean squares, over what each was not fitted to, of the cube-root error and of the residual, (k,) each."""
-
-    def one(fold: tuple[Array, Array, Array]) -> tuple[Array, Array]:
-        model, weight = with_vector(template, fold[0]), fold[2]
-        predicted = evaluate_pairs(model, data.wi, data.wo) * data.kappa
-        cube = weight * (jnp.cbrt(data.x) - jnp.cbrt(predicted)) ** 2
-        z = weight * residuals(model, data, fold[1]) ** 2
-        return jnp.sum(cube) / jnp.sum(weight), jnp.sum(z) / jnp.sum(weight)
-
-    return mapped(one, (values, s, left))  # pyright: ignore[reportArgumentType]
+def _errors(fit: Fit, draws: np.ndarray, s: np.ndarray, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Root mean squares, over what each was not fitted to, of the cube-root error and of the residual, (k,) each."""
+    data, found = as_numpy(fit.data), np.empty((2, len(draws)))
+    for part, x, noise, spread in predictions(fit, draws, s):
+        squares = (cube_root(data.x) - cube_root(x)) ** 2, misfits(x, noise, data, spread) ** 2
+        found[:, part] = [(left[part] * square).sum(axis=(1, 2)) for square in squares]
+    cube, z = np.sqrt(found / left.sum(axis=(1, 2)))
+    return cube, z

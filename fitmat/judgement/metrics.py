@@ -1,56 +1,53 @@
 """How far a fitted model is from its measurements, by the metrics of the literature.
 
-Compares no models with each other; `comparison` does.
+Compares no models with each other; `match` does.
 """
 
 import numpy as np
+from jaxtyping import Float
 
 from fitmat.fitting.result import Fit
-from fitmat.measurements.samples import Measurements
+from fitmat.measurements.incidences import incidences
 from fitmat.models.base import evaluate
+from fitmat.models.metrics import METRICS, above_minus_one, within
 
 
 def fit_metrics(fit: Fit) -> dict[str, float | None]:
     """How far a fitted model is from its measurements, by the metrics of the literature.
 
     Returns:
-        cube_root: √(mean (∛(M κ) − ∛(f κ))²), κ = cosθ_i; log_ratio: rms of ln((M κ + ε)/(f κ + ε)), κ = cosθ_i cosθ_o,
-        ε = 10⁻³; ngan: √(mean (M − f)² κ²) up to 80° (Ngan et al. 2005); low_e2: mean of
-        (ln(1 + M κ) − ln(1 + f κ))² sinθ_i (Löw et al. 2012, E2); peak_ratio: fitted over measured maximum, median over
-        incidences and channels; misfit_ratio: discrepancy over noise.
+        cube_root, log_ratio, ngan and low_e2: the `METRICS` of those names over the measured values instead of all
+        directions, κ = cosθ_i cosθ_o in the log ratio, E2 of values above −1/cosθ_i as the loss of that name has it;
+        peak_ratio: fitted over measured maximum, median over incidences and channels; misfit_ratio: discrepancy over
+        noise. None where no value is left.
     """
     m = fit.measurements
-    predicted = evaluate(fit.model, m.wi, m.wo)
-    ci, co, valid = m.wi[:, 2:3], m.wo[:, 2:3], m.valid
-    measured = np.where(valid, m.value, 0.0)
-
-    def mean(term: np.ndarray, keep: np.ndarray | bool = True) -> float | None:
-        used = term[valid & keep]
-        return float(used.mean()) if used.size else None
-
-    def root(value: float | None) -> float | None:
-        return None if value is None else value**0.5
-
-    cubes = (np.cbrt(measured * ci) - np.cbrt(predicted * ci)) ** 2
-    kappa = np.maximum(ci * co, 1e-3)
-    logs = np.log(np.maximum(measured * kappa, 0) + 1e-3) - np.log(predicted * kappa + 1e-3)
-    high = (np.maximum(m.theta_i, m.theta_o) <= np.deg2rad(80.0))[:, None]
-    low = (np.log1p(np.maximum(measured * ci, 0)) - np.log1p(predicted * ci)) ** 2
-    return {
-        "cube_root": root(mean(cubes)),
-        "log_ratio": root(mean(logs**2)),
-        "ngan": root(mean(((measured - predicted) * ci) ** 2, high)),
-        "low_e2": mean(low * np.sin(m.theta_i)[:, None]),
-        "peak_ratio": _peak_ratio(m, predicted),
-        "misfit_ratio": fit.misfit_ratio if fit.noise.known else None,
+    predicted, measured = evaluate(fit.model, m.wi, m.wo), np.where(m.valid, m.value, 0.0)
+    kept = {
+        "cube-root": m.valid,
+        "log-ratio": m.valid,
+        "ngan": m.valid & within(m.theta_i, m.theta_o)[:, None],
+        "low-e2": m.valid & above_minus_one(measured * m.wi[:, 2:]),
     }
+    found: dict[str, float | None] = {}
+    for name, keep in kept.items():
+        metric, cosines = METRICS[name], (m.wi[:, 2:], m.wo[:, 2:])
+        square = (metric.transform(measured, *cosines) - metric.transform(predicted, *cosines)) ** 2
+        rings = np.sin(m.theta_i)[:, None] if metric.kind == "mean square" else 1.0
+        mean = float((square * rings)[keep].mean()) if keep.any() else None
+        found[name.replace("-", "_")] = mean if mean is None or metric.kind == "mean square" else mean**0.5
+    misfit = fit.misfit_ratio if fit.noise.known else None
+    return found | {"peak_ratio": _peak_ratio(fit, predicted), "misfit_ratio": misfit}
 
 
-def _peak_ratio(m: Measurements, predicted: np.ndarray) -> float | None:
+def _peak_ratio(fit: Fit, predicted: Float[np.ndarray, "n c"]) -> float | None:
     """Fitted over measured maximum, median over incidence angles and channels."""
-    groups = np.unique(np.round(np.rad2deg(m.theta_i), 2), return_inverse=True)[1]
-    peaks = [np.full((groups.max() + 1, m.value.shape[1]), -np.inf) for _ in range(2)]
-    for peak, f in zip(peaks, (m.value, predicted), strict=True):
-        np.maximum.at(peak, groups, np.where(m.valid, f, -np.inf))
-    usable = np.isfinite(peaks[0]) & (peaks[0] > 0)
-    return float(np.median(peaks[1][usable] / peaks[0][usable])) if usable.any() else None
+    m, ratios = fit.measurements, []
+    for group in incidences(m.wi, np.any(m.valid, axis=1), most=None):
+        measured, fitted = (
+            np.where(m.valid[group.rows], f[group.rows], -np.inf).max(axis=0) for f in (m.value, predicted)
+        )
+        usable = np.isfinite(measured) & (measured > 0)
+        ratios.append(fitted[usable] / measured[usable])
+    found = np.concatenate(ratios) if ratios else np.zeros(0)
+    return float(np.median(found)) if found.size else None

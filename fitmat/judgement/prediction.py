@@ -4,25 +4,30 @@ Gives arrays; draws nothing.
 """
 
 import dataclasses
+from collections.abc import Iterator
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 from scipy.special import ndtri
 
-from fitmat.fitting.likelihood import Data, prepare, residuals
+from fitmat.fitting.likelihood import Data, residuals
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.result import Fit
 from fitmat.fitting.stabilising import from_stabilised, stabilised
 from fitmat.maths.directions import from_angles
 from fitmat.measurements.samples import Measurements
-from fitmat.models.base import AbstractBRDF, evaluate, evaluate_pairs
-from fitmat.models.parameters import with_vector
+from fitmat.models.around.noise import Noisy
+from fitmat.models.base import evaluate
+from fitmat.models.values import drawn, slices, values
 from fitmat.uncertainty.posterior import Posterior
 
 BAND_DRAWS = 200
+
+MOST_NUMBERS = 1_000_000
+"""Draws × values that are held at a time."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -91,27 +96,47 @@ def predictive_band(posterior: Posterior, rows: np.ndarray) -> Float[np.ndarray,
     Returns:
         Lower and upper limit, (2, k, c).
     """
-    fit = posterior.fit
-    noise = dataclasses.replace(fit.noise, sigma=fit.noise.sigma[rows])
-    data = prepare(fit.measurements.rows(rows), noise)
-    values, s = posterior.thinned(BAND_DRAWS)
+    fit, m = posterior.fit, posterior.fit.measurements.rows(rows)
+    draws, s = posterior.thinned(BAND_DRAWS)
     levels = np.random.default_rng(0).permutation((np.arange(len(s)) + 0.5) / len(s))
-    x = _draws(fit.model, data, jnp.asarray(values))
-    limits = _band(x, data.noise, jnp.asarray(s), jnp.asarray(ndtri(levels)))
-    return (np.asarray(limits) / np.asarray(data.kappa))[:, : len(rows)]
+    kappa = m.wi[:, 2:3]
+    noise, at_once = fit.noise.sigma[rows] * kappa, max(1, MOST_NUMBERS // (len(s) * m.value.shape[1]))
+    limits = np.empty((2, *noise.shape))
+    for part in slices(len(rows), at_once):
+        x = values(fit.model, draws, m.wi[part], m.wo[part]) * kappa[part]
+        new = replicated(x, noise[part], s[:, None, None], ndtri(levels)[:, None, None])
+        limits[:, part] = np.quantile(new, [0.025, 0.975], axis=0)
+    return limits / kappa
 
 
-@eqx.filter_jit
-def _draws(template: AbstractBRDF, data: Data, values: Array) -> Array:
-    """Model f κ of every draw, (d, n, c)."""
-    return jax.vmap(lambda v: evaluate_pairs(with_vector(template, v), data.wi, data.wo) * data.kappa)(values)
+def replicated(x: np.ndarray, noise: np.ndarray, s: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """New measurements of x = f κ, as the likelihood says: z of them is z(x) + N(0, 1); elementwise."""
+    return from_stabilised(stabilised(x, noise, s) + normal, noise, s)
 
 
-@jax.jit
-def _band(x: Array, noise: Array, discrepancy: Array, normal: Array) -> Array:
-    """95 % limits of new measurements of x; apart from the model, so that one program serves all."""
+def predictions(
+    fit: Fit, draws: Float[np.ndarray, "d p"], s: Float[np.ndarray, " d"]
+) -> Iterator[tuple[slice, np.ndarray, np.ndarray, np.ndarray]]:
+    """What draws predict of the samples that a fit saw, a few draws at a time.
 
-    def draw(x: Array, s: Array, e: Array) -> Array:
-        return from_stabilised(stabilised(x, noise, s) + e, noise, s)
+    Args:
+        fit: Its model and its `data`.
+        draws: Parameter vectors.
+        s: Discrepancies.
 
-    return jnp.quantile(jax.vmap(draw)(x, discrepancy, normal), jnp.array([0.025, 0.975]), axis=0)
+    Yields:
+        Which draws, f κ and σ κ, (k, n, c) each or (n, c) where the noise is given, and s as (k, 1, 1).
+    """
+    data = as_numpy(fit.data)
+    wi, wo, kappa = (np.asarray(part) for part in (data.wi, data.wo, data.kappa))
+    for part in slices(len(draws), max(1, MOST_NUMBERS // data.x.size)):
+        x, noise = values(fit.model, draws[part], wi, wo) * kappa, np.asarray(data.noise)
+        if isinstance(fit.model, Noisy):
+            assert data.level is not None
+            noise = kappa * np.stack([drawn(fit.model, draw).sigma(data.level) for draw in draws[part]])
+        yield part, x, noise, s[part, None, None]
+
+
+def as_numpy(data: Data) -> Data:
+    """The same with NumPy arrays, on which the formulas of `likelihood` need no compiled program."""
+    return jax.tree.map(np.asarray, data)

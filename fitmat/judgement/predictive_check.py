@@ -5,19 +5,17 @@ It fits nothing and compares no models: a model may be the best of all and still
 
 import dataclasses
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
+from scipy.special import log_ndtr
 
 from fitmat.errors import FitmatError
-from fitmat.fitting.likelihood import Data, inferred_noise, mapped
+from fitmat.fitting.likelihood import misfits
 from fitmat.fitting.losses import DEFAULT
+from fitmat.fitting.result import Fit
+from fitmat.judgement.multiplicity import adjusted_for_many
+from fitmat.judgement.prediction import as_numpy, predictions
 from fitmat.judgement.predictive_statistics import Look, Statistic
 from fitmat.measurements.incidences import incidences
-from fitmat.models.base import AbstractBRDF, evaluate_pairs
-from fitmat.models.parameters import with_vector
 from fitmat.text import html_table, text_table
 from fitmat.uncertainty.posterior import Posterior
 
@@ -124,36 +122,22 @@ def check_predictions(posterior: Posterior, *, seed: int) -> PredictiveCheck:
     highest, top = np.array([y[g.rows].max() for g in groups]), np.zeros(len(y))
     for group, value in zip(groups, highest, strict=True):
         top[group.rows] = value
-    values, s = posterior.thinned(int(np.clip(MOST_NUMBERS / used.size, FEWEST_DRAWS, DRAWS)))
-    seen = _seen(fit.model, data, jnp.asarray(values), jnp.asarray(s), jnp.asarray(top))
-    look = Look(fit, used, groups, rng, *(np.asarray(part) for part in seen))
+    draws, s = posterior.thinned(int(np.clip(MOST_NUMBERS / used.size, FEWEST_DRAWS, DRAWS)))
+    look = Look(fit, used, groups, rng, *_seen(fit, draws, s, top))
     found = [*look.whole(), *look.peaks(highest, s), *look.patterns(), *look.sides()]
-    adjusted = _holm(np.array([f.p for f in found]))
+    adjusted = adjusted_for_many(np.array([f.p for f in found]))
     judged = (dataclasses.replace(f, adjusted=float(a)) for f, a in zip(found, adjusted, strict=True))
     return PredictiveCheck(posterior, tuple(judged))
 
 
-@eqx.filter_jit
-def _seen(template: AbstractBRDF, data: Data, values: Array, s: Array, top: Array) -> tuple[Array, Array, Array, Array]:
+def _seen(
+    fit: Fit, draws: np.ndarray, s: np.ndarray, top: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Residuals, ln P(y_rep ≤ top), model f κ and noise of every draw, (d, n, c) each."""
-
-    def one(draw: tuple[Array, Array]) -> tuple[Array, Array, Array, Array]:
-        model, spread = with_vector(template, draw[0]), draw[1]
-        noise = inferred_noise(model, data) if data.loss.infers_noise else data.noise
-        x = evaluate_pairs(model, data.wi, data.wo) * data.kappa
-        at, measured, above = (
-            data.loss.transform(part, noise, data.kappa, spread) for part in (x, data.x, top[:, None] * data.kappa)
-        )
-        below = jnp.where(data.weight > 0, jax.scipy.special.log_ndtr(above - at), 0.0)
-        return data.weight * (measured - at), below, x, noise
-
-    return mapped(one, (values, s))  # pyright: ignore[reportArgumentType]
-
-
-def _holm(p: np.ndarray) -> np.ndarray:
-    """p-values of which, if all were chance, any falls below α with probability at most α (Holm 1979)."""
-    order = np.argsort(p)
-    raised = np.maximum.accumulate(p[order] * (len(p) - np.arange(len(p))))
-    adjusted = np.empty_like(p)
-    adjusted[order] = np.minimum(raised, 1.0)
-    return adjusted
+    data, found = as_numpy(fit.data), np.empty((4, len(draws), *fit.data.x.shape))
+    for part, x, noise, spread in predictions(fit, draws, s):
+        at, above = (data.loss.transform(f, noise, data.kappa, spread) for f in (x, top[:, None] * data.kappa))
+        found[0, part] = misfits(x, noise, data, spread)
+        found[1, part] = np.where(data.weight > 0, log_ndtr(above - at), 0.0)
+        found[2, part], found[3, part] = x, noise
+    return found[0], found[1], found[2], found[3]

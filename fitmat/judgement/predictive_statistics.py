@@ -7,14 +7,12 @@ import dataclasses
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import jax
 import numpy as np
 from jaxtyping import Float
 from scipy import stats
 
-from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.result import Fit
-from fitmat.fitting.stabilising import from_stabilised
+from fitmat.judgement.prediction import replicated
 from fitmat.measurements.incidences import Incidence
 from fitmat.measurements.noise import curves
 
@@ -113,7 +111,7 @@ class Look:
             order = np.argsort(-(self.x[0] / kappa)[group.rows].max(axis=1))
             bright = group.rows[np.resize(order, TOP)]
             x, noise = self.x[:, bright], self.noise[:, bright]
-            drawn = np.asarray(_replicated(x, noise, s, self.rng.standard_normal(x.shape))) / kappa[bright]
+            drawn = replicated(x, noise, s[:, None, None], self.rng.standard_normal(x.shape)) / kappa[bright]
             ends = np.quantile(np.where(self.used[bright], drawn, -np.inf).max(axis=(1, 2)), [0.025, 0.975])
             yield _statistic("peak", group.name, peak, ends, 1.0 - under, under)
 
@@ -160,14 +158,6 @@ class Look:
                 above = stats.norm.sf(mean * np.sqrt(n))
                 ends = np.array([-1.96, 1.96]) / np.sqrt(n)
                 yield _statistic("side", f"{group.name} {name}", mean.mean(), ends, above, 1.0 - above)
-
-
-_replicated = jax.jit(
-    lambda x, noise, s, normal: jax.vmap(lambda x, a, s, e: from_stabilised(DEFAULT.transform(x, a, a, s) + e, a, s))(
-        x, noise, s, normal
-    )
-)
-# New measurements of x; under a Gaussian loss s is 0, where the transform is x/noise.
 
 
 def _statistic(

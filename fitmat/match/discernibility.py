@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from fitmat.fitting.result import Fit
 from fitmat.match.distances import PairedDraws
+from fitmat.measurements.incidences import incidences
 from fitmat.models.values import values
 from fitmat.uncertainty.estimate import Estimate, band, estimate
 
@@ -24,7 +25,7 @@ ROWS = 2000
 """At most so many readings are looked at, evenly spread over the file; sums are scaled to all of them."""
 
 MOST_INCIDENCES = 18
-"""More incidence angles than this are taken together in steps of 5°."""
+"""More incidence angles than this are taken together, neighbours first."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -90,14 +91,14 @@ def tell_apart(empirical: Fit, microfacet: Fit, draws: PairedDraws) -> Telling:
     one, other = (values(model, part, *directions) for model, part in zip(models, draws, strict=True))
     valid = m.valid[rows]
     z = np.where(valid, (one - other) / np.where(valid, sigma[rows], 1.0), 0.0)
-    angles, group = _groups(np.rad2deg(m.theta_i[rows]))
-    member = (group == np.arange(len(angles))[:, None]).astype(float)
+    groups = incidences(m.wi[rows], np.ones(len(rows), bool), MOST_INCIDENCES)
+    member = np.stack([np.isin(np.arange(len(rows)), group.rows) for group in groups]).astype(float)
     count = member @ valid.sum(axis=1)
     squares = (z**2).sum(axis=2) @ member.T
     whole = len(usable) / len(rows)
     separation = np.sqrt(whole * squares)
     return Telling(
-        theta_i_deg=angles,
+        theta_i_deg=np.array([group.theta_i_deg for group in groups]),
         readings=np.round(whole * count).astype(int),
         rms=band(np.sqrt(squares / count)),
         beyond=band((np.abs(z) > VISIBLE).sum(axis=2) @ member.T / count),
@@ -106,12 +107,3 @@ def tell_apart(empirical: Fit, microfacet: Fit, draws: PairedDraws) -> Telling:
         every=estimate(np.sqrt(whole * squares.sum(axis=1))),
         known=empirical.noise.known,
     )
-
-
-def _groups(degrees: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Incidence angles and, for every row, which one it belongs to."""
-    exact = np.round(degrees, 1)
-    angles, group = np.unique(exact, return_inverse=True)
-    if len(angles) > MOST_INCIDENCES:
-        angles, group = np.unique(5.0 * np.round(degrees / 5.0), return_inverse=True)
-    return angles, group.reshape(-1)

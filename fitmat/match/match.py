@@ -20,7 +20,7 @@ from fitmat.match.imitation import Imitation, imitate
 from fitmat.match.sentences import CLOSE as CLOSE
 from fitmat.match.sentences import SIMILAR as SIMILAR
 from fitmat.match.sentences import STRONG_EVIDENCE as STRONG_EVIDENCE
-from fitmat.measurements.samples import Measurements
+from fitmat.measurements.incidences import incidences
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
 from fitmat.models.registry import LOBES, lobe_names
 from fitmat.uncertainty.estimate import Estimate, band, estimate
@@ -40,6 +40,9 @@ ALBEDO_ANGLES = ANGLES
 
 ALBEDO_ERROR = 2e-3
 """Albedos above 1 by more than the quadrature's error are called impossible."""
+
+MOST_INCIDENCES = 16
+"""More measured incidence angles than this are taken together, neighbours first."""
 
 IMITATED = ("relative", "ngan", "cube-root", "log-ratio")
 """Metrics in which each fitted model is imitated by the other."""
@@ -169,10 +172,12 @@ def compare(one: Posterior, other: Posterior, *, spheres: bool = True, imitation
     empirical, microfacet = (one, other) if is_empirical(one.fit.name) else (other, one)
     _refuse_unlike(empirical, microfacet)
     fits, models = (empirical.fit, microfacet.fit), (empirical.fit.model, microfacet.fit.model)
-    draws = _paired(empirical, microfacet)
+    draws, m = _paired(empirical, microfacet), fits[0].measurements
+    every = incidences(m.wi, np.any(m.valid, axis=1), MOST_INCIDENCES)
+    measured = np.deg2rad([group.theta_i_deg for group in every])
     few = draws[0][: FEW_DRAWS + 1], draws[1][: FEW_DRAWS + 1]
     with ThreadPoolExecutor() as pool:
-        measuring = pool.submit(measure_distances, *models, draws=draws, measured=_incidences(fits[0].measurements))
+        measuring = pool.submit(measure_distances, *models, draws=draws, measured=measured)
         ablating = pool.submit(ablate, *models, draws=few)
         telling = pool.submit(tell_apart, *fits, draws=few)
         seeing = pool.submit(_perceived, *fits, draws=draws) if spheres else None
@@ -261,9 +266,3 @@ def _draws_of(posterior: Posterior, name: str) -> np.ndarray | None:
 def _ratio(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     count = min(len(one), len(other))
     return one[:count] / other[:count]
-
-
-def _incidences(m: Measurements) -> np.ndarray:
-    """At most 16 of the measured incidence angles in radians, evenly spread."""
-    angles = np.unique(np.round(m.theta_i[m.valid.any(axis=1)], 4))
-    return angles[np.unique(np.linspace(0, len(angles) - 1, 16).astype(int))]

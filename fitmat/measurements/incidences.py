@@ -32,13 +32,15 @@ class Incidence:
     rows: np.ndarray
 
 
-def incidences(wi: Float[np.ndarray, "n 3"], used: Bool[np.ndarray, " n"], most: int = MOST) -> tuple[Incidence, ...]:
+def incidences(
+    wi: Float[np.ndarray, "n 3"], used: Bool[np.ndarray, " n"], most: int | None = MOST
+) -> tuple[Incidence, ...]:
     """The samples by angle of incidence, rising.
 
     Args:
         wi: Unit vectors to the light, (n, 3).
         used: Which samples count, (n,).
-        most: At most so many groups.
+        most: At most so many groups; None for as many as there are angles.
 
     Example:
         >>> import numpy as np
@@ -46,12 +48,15 @@ def incidences(wi: Float[np.ndarray, "n 3"], used: Bool[np.ndarray, " n"], most:
         ['0°', '36.9°']
     """
     rows = np.flatnonzero(used)
-    step = np.round(np.rad2deg(zenith(wi))[rows] / SAME_DEG).astype(int)
+    degrees = np.rad2deg(zenith(wi[rows]))
+    step = np.round(degrees / SAME_DEG).astype(int)
+    order = np.argsort(step, kind="stable")
+    angles, first = np.unique(step[order], return_index=True)
+    count = len(angles) if most is None else min(most, len(angles))
     found = []
-    angles = np.unique(step)
-    for group in np.array_split(angles, min(most, len(angles))) if len(angles) else []:
-        ends = SAME_DEG * group[0], SAME_DEG * group[-1]
+    for group in np.array_split(np.arange(len(angles)), count) if count else []:
+        ends = SAME_DEG * angles[group[0]], SAME_DEG * angles[group[-1]]
         name = f"{ends[0]:.4g}°" if len(group) == 1 else f"{ends[0]:.4g}–{ends[1]:.4g}°"
-        inside = (step >= group[0]) & (step <= group[-1])
-        found.append(Incidence(name, float(SAME_DEG * step[inside].mean()), rows[inside]))
+        inside = order[first[group[0]] : np.append(first, len(order))[group[-1] + 1]]
+        found.append(Incidence(name, float(degrees[inside].mean()), rows[np.sort(inside)]))
     return tuple(found)

@@ -5,7 +5,7 @@ It knows no measurement and no draw's meaning; what is done with the values is N
 
 import itertools
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import equinox as eqx
 import jax
@@ -25,6 +25,8 @@ A block takes 0.01–0.02 µs a value and 0.2 ms; a coat or a lobe that integrat
 besides, however many directions follow. Draws that fill up a block cost nothing.
 """
 
+
+M = TypeVar("M", bound=AbstractBRDF)
 
 Draws = tuple[AbstractBRDF, Float[np.ndarray, "d p"]]
 """A model and parameter vectors of it."""
@@ -52,8 +54,8 @@ def values(
     """
     most = _block_shape(len(draws), len(wi))
     found = None
-    for rows in _slices(len(draws), most[0]):
-        for places in _slices(len(wi), most[1]):
+    for rows in slices(len(draws), most[0]):
+        for places in slices(len(wi), most[1]):
             light, sensor = (_filled(w[places], most[1]) for w in (wi, wo))
             block, _ = _block(model, _filled(draws[rows], most[0]), light, sensor, np.array(rows.stop - rows.start))
             if found is None:
@@ -76,9 +78,9 @@ def blocks(
         Which draws, the place of the set, and the values of every model, (draws, m, c).
     """
     count = max(len(np.atleast_2d(w)) for w in pairs[0])
-    for some in _slices(len(pairs), max(1, LARGE[1] // count)):
+    for some in slices(len(pairs), max(1, LARGE[1] // count)):
         wi, wo = (np.concatenate([np.broadcast_to(pair[k], (count, 3)) for pair in pairs[some]]) for k in range(2))
-        for rows in _slices(len(parts[0][1]), LARGE[0]):
+        for rows in slices(len(parts[0][1]), LARGE[0]):
             found = [values(model, draws[rows], wi, wo) for model, draws in parts]
             for k in range(some.stop - some.start):
                 yield rows, some.start + k, [f[:, k * count : (k + 1) * count] for f in found]
@@ -88,7 +90,7 @@ def widths(model: AbstractBRDF, draws: Float[np.ndarray, "d p"]) -> Float[np.nda
     """Slope-like width of the narrowest lobe of every draw, as `AbstractBRDF.width`; by the program of `values`."""
     up = np.tile([0.0, 0.0, 1.0], (SMALL[1], 1))
     found = []
-    for rows in _slices(len(draws), SMALL[0]):
+    for rows in slices(len(draws), SMALL[0]):
         count = rows.stop - rows.start
         found.append(np.asarray(_block(model, _filled(draws[rows], SMALL[0]), up, up, np.array(count))[1])[:count])
     return np.concatenate(found)
@@ -96,11 +98,17 @@ def widths(model: AbstractBRDF, draws: Float[np.ndarray, "d p"]) -> Float[np.nda
 
 def surfaces(model: AbstractBRDF, draws: Float[np.ndarray, "d p"]) -> Draws:
     """The material without what instrument and mount do, and its part of every draw; see `instrument.surface`."""
+    places = numbers(surface(drawn(model, np.arange(draws.shape[1]))))
+    return surface(model), draws[:, places]
+
+
+def drawn(model: M, draw: np.ndarray) -> M:
+    """`parameters.with_vector` in NumPy, without a compiled program: for formulas that take either."""
     leaves, structure = jax.tree.flatten(model)
-    ends = np.cumsum([np.size(leaf) for leaf in leaves])
-    places = [np.arange(end - np.size(leaf), end) for leaf, end in zip(leaves, ends, strict=True)]
-    kept = jax.tree.leaves(surface(jax.tree.unflatten(structure, places)))
-    return surface(model), draws[:, np.concatenate(kept)]
+    parts = np.split(draw, np.cumsum([np.size(leaf) for leaf in leaves])[:-1])
+    return jax.tree.unflatten(
+        structure, [part.reshape(np.shape(leaf)) for part, leaf in zip(parts, leaves, strict=True)]
+    )
 
 
 def numbers(model: AbstractBRDF) -> Float[np.ndarray, " p"]:
@@ -112,8 +120,8 @@ def _block_shape(draws: int, directions: int) -> tuple[int, int]:
     return LARGE if draws >= LARGE[0] // 2 and directions >= LARGE[1] // 2 else SMALL
 
 
-def _slices(count: int, most: int) -> Iterator[slice]:
-    """Even parts of at most so many."""
+def slices(count: int, most: int) -> Iterator[slice]:
+    """Even parts of a number of things, each of at most so many."""
     ends = np.linspace(0, count, -(-count // most) + 1).astype(int).tolist()
     return (slice(start, stop) for start, stop in itertools.pairwise(ends))
 

@@ -11,7 +11,8 @@ from scipy import stats
 import fitmat as fm
 from fitmat.errors import FitmatError, ModelError
 from fitmat.judgement import calibration
-from fitmat.judgement.calibration import DRAWS, Calibration, calibrate, coverage_limits, join, rejected
+from fitmat.judgement.calibration import DRAWS, Calibration, calibrate, coverage_limits, join
+from fitmat.judgement.multiplicity import adjusted_for_many
 from fitmat.judgement.uniformity import SETS, band, p_values
 
 PRIORS: dict[str, Any] = {"kd": (0.5, 0.1), "discrepancy": (0.0, 0.005)}
@@ -70,9 +71,9 @@ def test_uniform_ranks_leave_their_band_as_often_as_it_says() -> None:
 
 def test_holm_by_hand() -> None:
     """Holm (1979): 0.01 ≤ 0.05/4, 0.013 ≤ 0.05/3, 0.03 > 0.05/2, after which nothing more falls."""
-    assert rejected(np.array([0.03, 0.01, 0.04, 0.013]), 0.05) == [1, 3]
-    assert rejected(np.array([0.2, 0.9]), 0.05) == []
-    assert rejected(np.array([1e-4, 1e-3]), 0.05) == [0, 1]
+    assert adjusted_for_many(np.array([0.03, 0.01, 0.04, 0.013])) == pytest.approx([0.06, 0.04, 0.06, 0.04])
+    assert adjusted_for_many(np.array([0.2, 0.9])) == pytest.approx([0.4, 0.9])
+    assert adjusted_for_many(np.array([1e-4, 1e-3])) == pytest.approx([2e-4, 1e-3])
 
 
 def test_limits_of_a_coverage_by_closed_form() -> None:

@@ -6,6 +6,7 @@ It changes no value: the likelihood reads the noise.
 import jax.numpy as jnp
 
 from fitmat._types import Samples, Scalar, Spectrum, Vec3
+from fitmat.maths.arrays import library
 from fitmat.models.around.shown import AbstractShown
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import param
@@ -38,7 +39,7 @@ class Noisy(AbstractShown):
 
     def sigma(self, level: Samples) -> Samples:
         """σ in sr⁻¹ at the levels ȳ, (n, c)."""
-        return jnp.sqrt(self.absolute**2 + (self.relative * level) ** 2)
+        return library(level, self.absolute).sqrt(self.absolute**2 + (self.relative * level) ** 2)
 
     @staticmethod
     def least_sigma(level: Samples) -> Samples:
