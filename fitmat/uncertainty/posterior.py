@@ -15,6 +15,7 @@ from jaxtyping import Float
 
 from fitmat.errors import OutputError
 from fitmat.extras import needed
+from fitmat.fitting.coordinates import channel_names
 from fitmat.fitting.result import Fit
 from fitmat.models.parameters import Entry
 from fitmat.text import html_table, text_table, with_error
@@ -125,12 +126,12 @@ class Posterior:
         sd, interval = self.sd(), self.interval()
         return [
             (
-                f"{e.name} {channels[k]}" if e.shape and len(channels) > 1 else e.name,
+                name,
                 with_error(float(self.fit.values[e.place.start + k]), float(sd[e.place.start + k])),
                 " – ".join(f"{limit:.4g}" for limit in interval[e.place.start + k]),
             )
             for e in self.fit.entries
-            for k in range(e.size)
+            for k, name in enumerate(channel_names(e, channels))
         ]
 
     def __str__(self) -> str:
@@ -213,9 +214,7 @@ class Posterior:
 
     def _channels(self, entry: Entry, part: np.ndarray) -> list[tuple[str, np.ndarray]]:
         """The draws of a parameter channel by channel, each with its name."""
-        channels = self.fit.measurements.channels
-        several = entry.shape and len(channels) > 1
-        return [(f"{entry.name} {channels[k]}" if several else entry.name, part[..., k]) for k in range(entry.size)]
+        return list(zip(channel_names(entry, self.fit.measurements.channels), np.moveaxis(part, -1, 0), strict=True))
 
 
 def split_rhat(chain: Float[np.ndarray, "steps walkers d"]) -> Float[np.ndarray, " d"]:
