@@ -4,6 +4,7 @@ import gc
 import os
 import tempfile
 from collections.abc import Callable, Iterator
+from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 
@@ -20,6 +21,12 @@ hypothesis.settings.load_profile("fitmat")
 MOST_MAPS = 30_000
 """Memory maps of a process from which on it lets go of its compiled programs; Linux grants 65,530."""
 
+HASTE = "--xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=0"
+"""Halves the time of compiling, which most tests are, at the price of slower programs; the studies run without."""
+
+KNOWS_HASTE = "0.10."
+"""Releases of jaxlib that were seen to know these flags: an unknown flag ends the process."""
+
 _COMPILED = pytest.StashKey[tempfile.TemporaryDirectory[str]]()
 
 
@@ -33,6 +40,8 @@ def pytest_configure(config: pytest.Config) -> None:
         folder = tempfile.TemporaryDirectory(prefix="fitmat-tests-", ignore_cleanup_errors=True)
         config.stash[_COMPILED] = folder
         os.environ["FITMAT_COMPILED"] = folder.name
+    if config.option.markexpr == "not study" and version("jaxlib").startswith(KNOWS_HASTE):
+        os.environ.setdefault("XLA_FLAGS", HASTE)
     compiled = Path(os.environ["FITMAT_COMPILED"]) / "fitmat" / "compiled"
     os.environ["XDG_CACHE_HOME"] = os.environ["FITMAT_COMPILED"]
     os.environ["JAX_COMPILATION_CACHE_DIR"] = str(compiled)
