@@ -218,9 +218,11 @@ class Posterior:
 
 
 def split_rhat(chain: Float[np.ndarray, "steps walkers d"]) -> Float[np.ndarray, " d"]:
-    """Split-R̂ with every half of every walker as a chain (Gelman et al., Bayesian Data Analysis, sec. 11.4)."""
-    half = len(chain) // 2
-    parts = np.concatenate([chain[:half], chain[half : 2 * half]], axis=1)
-    within = parts.var(axis=0, ddof=1).mean(axis=0)
-    between = parts.mean(axis=0).var(axis=0, ddof=1)
-    return np.sqrt((half - 1) / half + between / np.where(within > 0, within, np.nan))
+    """Rank-normalised split-R̂, of the bulk or of the tails, whichever is larger; walkers count as chains.
+
+    Vehtari, Gelman, Simpson, Carpenter & Bürkner 2021, Bayesian Analysis 16, eqs. 1–4 and 14, by ArviZ.
+    """
+    from arviz_stats.base.array import array_stats
+
+    with np.errstate(invalid="ignore", divide="ignore"):  # NaN where no walker moved
+        return np.asarray(array_stats.rhat(chain, chain_axis=1, draw_axis=0), float)

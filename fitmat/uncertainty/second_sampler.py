@@ -22,7 +22,7 @@ from fitmat.fitting.result import Fit
 from fitmat.text import html_table, text_table
 from fitmat.uncertainty.density import log_density_at, physical
 from fitmat.uncertainty.laplace import draws
-from fitmat.uncertainty.posterior import ENOUGH_ESS, GOOD_RHAT, Posterior
+from fitmat.uncertainty.posterior import ENOUGH_ESS, GOOD_RHAT, Posterior, split_rhat
 from fitmat.uncertainty.scaled_weights import sampled
 
 AGREEING = 4.0
@@ -176,8 +176,6 @@ def compare_chains(
     Raises:
         FitmatError: the posterior holds no chain.
     """
-    from arviz_stats.base.array import array_stats
-
     if posterior.chain is None:
         raise FitmatError(f"{posterior.fit.name}: was not sampled, so that there is no chain to compare.")
     own = np.swapaxes(posterior.chain, 0, 1)
@@ -189,7 +187,7 @@ def compare_chains(
     return SecondOpinion(
         posterior,
         tuple(agreements),
-        rhat=max(float(np.asarray(array_stats.rhat(part))) for part in parts),
+        rhat=float(split_rhat(np.swapaxes(other, 0, 1)[..., : len(agreements)]).max()),
         ess=min(float(np.min(_effective(part))) for part in parts),
         diverging=diverging,
     )

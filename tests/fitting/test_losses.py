@@ -15,6 +15,7 @@ import fitmat as fm
 from fitmat.errors import FitmatError, ModelError
 from fitmat.fitting.likelihood import Data, log_likelihood, prepare
 from fitmat.fitting.losses import BAD_SHARE, BAD_SPREAD, LOSSES, T_DOF, bad_probability, loss
+from fitmat.judgement.metrics import fit_metrics
 from fitmat.measurements.noise import measured_noise
 from fitmat.models.around.noise import Noisy
 from fitmat.models.base import AbstractBRDF, evaluate
@@ -79,6 +80,31 @@ def test_an_objective_is_the_one_of_the_literature(made: fm.Measurements, name: 
     """The formula written out above, minimised by `curve_fit`, ends at the same parameters."""
     ours = fm.fit(made, "lambert+blinn-phong", loss=name)
     np.testing.assert_allclose(ours.values[ours.free], fitted_by_scipy(made, name, ours), rtol=SIX_DIGITS)
+
+
+def test_the_reported_e2_is_the_one_that_its_loss_minimises() -> None:
+    """A dark surface of which a third of the readings are below 0; were they taken for 0, E2 would ask for more light."""
+    theta_o = np.tile(ANGLES[1], 3)
+    theta_i, dark = np.repeat(ANGLES[0], len(ANGLES[1])), 0.05
+    m = fm.from_arrays(theta_i, theta_o, dark + 0.1 * np.random.default_rng(3).normal(size=len(theta_i)))
+    fit = fm.fit(m, "lambert", loss="low-e2")
+    least, less, more = (
+        fit_metrics(dataclasses.replace(fit, model=with_vector(fit.model, jnp.asarray(share * fit.values))))["low_e2"]
+        for share in (1.0, 0.98, 1.02)
+    )
+    assert least is not None
+    assert less is not None
+    assert more is not None
+    assert least < min(less, more)
+
+
+def test_what_e2_is_not_defined_for_does_not_count() -> None:
+    """Readings at and below −1/cosθ_i, which the loss of that name leaves out as well."""
+    theta_o = np.deg2rad([0.0, 10.0, 20.0, 30.0])
+    m = fm.from_arrays(np.full(4, np.deg2rad(60.0)), theta_o, np.array([0.1, 0.2, -2.0, -5.0]))
+    fit = dataclasses.replace(fm.fit(m, "lambert", loss="cube-root"), model=fm.model("lambert", kd=0.1 * np.pi))
+    by_hand = np.log1p(0.2 * 0.5) - np.log1p(0.1 * 0.5)
+    assert fit_metrics(fit)["low_e2"] == pytest.approx(by_hand**2 / 2 * np.sin(np.deg2rad(60.0)))
 
 
 @pytest.mark.study

@@ -208,13 +208,18 @@ def test_nothing_to_sample_is_said() -> None:
 
 
 def test_split_rhat_by_hand() -> None:
-    """Gelman et al., BDA3, eqs. 11.1–11.4, chain by chain; here with two walkers of four steps."""
-    chain = np.array([[1.0, 5.0], [2.0, 7.0], [4.0, 6.0], [3.0, 9.0]])
-    halves = [[1.0, 2.0], [5.0, 7.0], [4.0, 3.0], [6.0, 9.0]]
-    between = 2 * np.var([np.mean(h) for h in halves], ddof=1)
-    within = np.mean([np.var(h, ddof=1) for h in halves])
-    by_hand = np.sqrt((within * (2 - 1) / 2 + between / 2) / within)
-    assert split_rhat(chain[..., None]) == pytest.approx([by_hand])
+    """Vehtari et al. 2021, eqs. 1–4 and 14, chain by chain; two walkers of eight steps, one of which drifts."""
+    chain = np.random.default_rng(3).normal(size=(8, 2)) + np.linspace(0.0, 3.0, 8)[:, None] * [1.0, 0.0]
+    halves = np.array([chain[:4, 0], chain[:4, 1], chain[4:, 0], chain[4:, 1]])
+
+    def by_hand(halves: np.ndarray) -> float:
+        z = stats.norm.ppf((stats.rankdata(halves).reshape(halves.shape) - 3 / 8) / (halves.size + 1 / 4))
+        between = 4 * np.var([np.mean(h) for h in z], ddof=1)
+        within = np.mean([np.var(h, ddof=1) for h in z])
+        return np.sqrt((within * (4 - 1) / 4 + between / 4) / within)
+
+    expected = max(by_hand(halves), by_hand(np.abs(halves - np.median(halves))))
+    assert split_rhat(chain[..., None]) == pytest.approx([expected])
 
 
 def test_split_rhat_knows_good_chains_from_bad() -> None:
