@@ -25,9 +25,9 @@ def check(measurements: Measurements, picture: Path | None, *, force: bool) -> E
     refuse_picture(picture, force=force)
     found = examine(measurements)
     if picture is not None:
-        from fitmat.reports.examination_plots import plot_examination
+        from fitmat.reports.examination_plots import examination
 
-        write_picture(plot_examination(found), picture)
+        write_picture(examination(found), picture)
     return found
 
 

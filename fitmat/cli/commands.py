@@ -61,20 +61,20 @@ def _setup() -> None:
 def fit(
     reading: dict[str, Any],
     instrument: Any,
-    file: options.File,
-    models: options.Models = DEFAULT_MODELS,
-    out: options.Out = None,
-    force: options.Force = False,
-    json_: options.Json = False,
-    no_mcmc: options.NoMcmc = False,
-    seed: options.Seed = 0,
-    fix: options.Fix = None,
-    masking: options.Masking = None,
-    loss: options.Loss = "default",
-    prior: options.Prior = None,
-    check_posterior: options.CheckPosterior = False,
-    ior: options.Ior = None,
-    tilt: options.Tilt = False,
+    file: options.FileFlag,
+    models: options.ModelsFlag = DEFAULT_MODELS,
+    out: options.OutFlag = None,
+    force: options.ForceFlag = False,
+    json_: options.JsonFlag = False,
+    no_mcmc: options.NoMcmcFlag = False,
+    seed: options.SeedFlag = 0,
+    fix: options.FixFlag = None,
+    masking: options.MaskingFlag = None,
+    loss: options.LossFlag = "default",
+    prior: options.PriorFlag = None,
+    check_posterior: options.CheckPosteriorFlag = False,
+    ior: options.IorFlag = None,
+    tilt: options.TiltFlag = False,
 ) -> None:
     """Fit models to a file of measurements and write a report with the Phong–microfacet match."""
     _setup()
@@ -121,19 +121,19 @@ def fit(
 @flags.takes(flags.instrument)
 def simulate(
     instrument: Any,
-    model: options.Model = None,
-    out: options.SimulatedOut = Path("simulated.csv"),
-    set_: options.Set = None,
-    theta_i: options.ThetaI = "10,30,45,60,75",
-    theta_o: options.ThetaO = "-80:80:2",
-    phi: options.Phi = "180",
-    phi_i: options.PhiI = "0",
-    noise: options.Noise = 0.02,
-    floor: options.Floor = 1e-3,
-    seed: options.SimulatedSeed = 0,
-    masking: options.Masking = None,
-    catalogue: options.Catalogue = None,
-    force: options.Replace = False,
+    model: options.ModelFlag = None,
+    out: options.SimulatedOutFlag = Path("simulated.csv"),
+    set_: options.SetFlag = None,
+    theta_i: options.ThetaIFlag = "10,30,45,60,75",
+    theta_o: options.ThetaOFlag = "-80:80:2",
+    phi: options.PhiFlag = "180",
+    phi_i: options.PhiIFlag = "0",
+    noise: options.NoiseFlag = 0.02,
+    floor: options.FloorFlag = 1e-3,
+    seed: options.SimulatedSeedFlag = 0,
+    masking: options.MaskingFlag = None,
+    catalogue: options.CatalogueFlag = None,
+    force: options.ReplaceFlag = False,
 ) -> None:
     """Simulate measurements of a known material, to test an instrument's plan or fitmat itself."""
     _setup()
@@ -162,10 +162,10 @@ def simulate(
 def check(
     reading: dict[str, Any],
     instrument: Any,
-    file: options.File,
-    plot: options.Plot = None,
-    force: options.Replace = False,
-    json_: options.Json = False,
+    file: options.FileFlag,
+    plot: options.PlotFlag = None,
+    force: options.ReplaceFlag = False,
+    json_: options.JsonFlag = False,
 ) -> None:
     """Describe a file before any fit: what was measured where, how consistently, and what can be learnt from it."""
     _setup()
@@ -186,9 +186,9 @@ def check(
 @flags.takes(flags.reading)
 def convert(
     reading: dict[str, Any],
-    file: options.File,
-    out: options.Converted,
-    force: options.Replace = False,
+    file: options.FileFlag,
+    out: options.ConvertedFlag,
+    force: options.ReplaceFlag = False,
 ) -> None:
     """Write measurements in another format; what that cannot hold is said."""
     from fitmat.measurements import writing
@@ -203,8 +203,8 @@ def convert(
 
 @app.command()
 def models(
-    name: options.Name = None,
-    check: options.Check = False,
+    name: options.NameFlag = None,
+    check: options.CheckFlag = False,
 ) -> None:
     """List the models, or print the manual page of one: formula, parameters, limits, reference, laws."""
     from fitmat.cli import manual
@@ -227,16 +227,16 @@ def models(
 def design(
     reading: dict[str, Any],
     instrument: Any,
-    file: options.File,
-    models: options.Models = DEFAULT_MODELS,
-    for_: options.For = None,
-    kind: options.Kind = "sample",
-    count: options.Count = 5,
-    plot: options.DesignPlot = None,
-    force: options.Replace = False,
-    json_: options.Json = False,
-    seed: options.Seed = 0,
-    fix: options.Fix = None,
+    file: options.FileFlag,
+    models: options.ModelsFlag = DEFAULT_MODELS,
+    for_: options.ForFlag = None,
+    kind: options.KindFlag = "sample",
+    count: options.CountFlag = 5,
+    plot: options.DesignPlotFlag = None,
+    force: options.ReplaceFlag = False,
+    json_: options.JsonFlag = False,
+    seed: options.SeedFlag = 0,
+    fix: options.FixFlag = None,
 ) -> None:
     """Say which angles to measure next, and by how much they would narrow what is not yet known."""
     _setup()

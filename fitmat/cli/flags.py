@@ -16,7 +16,7 @@ from fitmat.errors import ReadError
 FILE = "What the file does not say"
 INSTRUMENT = "The instrument"
 
-Columns = Annotated[
+ColumnsFlag = Annotated[
     str | None,
     typer.Option(
         help="Which column is what, where the header has other names: theta_i=Zenith,brdf=3 (a name in the "
@@ -27,7 +27,7 @@ Columns = Annotated[
     ),
 ]
 
-Quantity = Annotated[
+QuantityFlag = Annotated[
     str | None,
     typer.Option(
         help="What a column called 'value' holds: brdf (sr⁻¹), brdf_cos, reflectance_factor, radiance, panel_ratio.",
@@ -37,7 +37,7 @@ Quantity = Annotated[
     ),
 ]
 
-AngleUnit = Annotated[
+AngleUnitFlag = Annotated[
     str | None,
     typer.Option(
         help="Unit of the angles: degrees (default) or radians.",
@@ -47,7 +47,7 @@ AngleUnit = Annotated[
     ),
 ]
 
-Forward = Annotated[
+ForwardFlag = Annotated[
     str,
     typer.Option(
         help="Sign of theta_o on the mirror side, in files without azimuth: positive or negative.",
@@ -56,14 +56,14 @@ Forward = Annotated[
     ),
 ]
 
-SpecularAzimuth = Annotated[
+SpecularAzimuthFlag = Annotated[
     int,
     typer.Option(
         help="Relative azimuth phi of the mirror side in the file: 180 or 0.", metavar="PHI", rich_help_panel=FILE
     ),
 ]
 
-Intensity = Annotated[
+IntensityFlag = Annotated[
     float | None,
     typer.Option(
         help="Of the source, in W/sr, where the file holds radiances.",
@@ -73,7 +73,7 @@ Intensity = Annotated[
     ),
 ]
 
-Distance = Annotated[
+DistanceFlag = Annotated[
     float | None,
     typer.Option(
         help="Of the source from the sample, in m, with --intensity.",
@@ -83,7 +83,7 @@ Distance = Annotated[
     ),
 ]
 
-Where = Annotated[
+WhereFlag = Annotated[
     str | None,
     typer.Option(
         help="Read only the rows in which a column has this value: material=Alu.",
@@ -93,7 +93,7 @@ Where = Annotated[
     ),
 ]
 
-Panel = Annotated[
+PanelFlag = Annotated[
     float | None,
     typer.Option(
         help="Reflectance factor of the white panel, where the file holds signal and reference, or their ratio.",
@@ -103,7 +103,7 @@ Panel = Annotated[
     ),
 ]
 
-UnknownScale = Annotated[
+UnknownScaleFlag = Annotated[
     bool,
     typer.Option(
         "--unknown-scale",
@@ -112,7 +112,7 @@ UnknownScale = Annotated[
     ),
 ]
 
-Calibration = Annotated[
+CalibrationFlag = Annotated[
     float,
     typer.Option(
         min=0,
@@ -124,7 +124,7 @@ Calibration = Annotated[
     ),
 ]
 
-SourceAngle = Annotated[
+SourceAngleFlag = Annotated[
     float,
     typer.Option(
         min=0,
@@ -136,7 +136,7 @@ SourceAngle = Annotated[
     ),
 ]
 
-ReceiverAngle = Annotated[
+ReceiverAngleFlag = Annotated[
     float,
     typer.Option(
         min=0,
@@ -148,7 +148,7 @@ ReceiverAngle = Annotated[
     ),
 ]
 
-Dark = Annotated[
+DarkFlag = Annotated[
     str,
     typer.Option(
         help="Dark signal and stray light as BRDF times cosθ_o, in sr⁻¹, or 'fit'.",
@@ -160,26 +160,26 @@ Dark = Annotated[
 
 
 def reading(
-    columns: Columns = None,
-    quantity: Quantity = None,
-    angle_unit: AngleUnit = None,
-    forward: Forward = "positive",
-    specular_azimuth: SpecularAzimuth = 180,
-    intensity: Intensity = None,
-    distance: Distance = None,
-    where: Where = None,
-    panel: Panel = None,
-    unknown_scale: UnknownScale = False,
+    columns: ColumnsFlag = None,
+    quantity: QuantityFlag = None,
+    angle_unit: AngleUnitFlag = None,
+    forward: ForwardFlag = "positive",
+    specular_azimuth: SpecularAzimuthFlag = 180,
+    intensity: IntensityFlag = None,
+    distance: DistanceFlag = None,
+    where: WhereFlag = None,
+    panel: PanelFlag = None,
+    unknown_scale: UnknownScaleFlag = False,
 ) -> dict[str, Any]:
     """What the flags say of a file, as arguments of `fitmat.read`."""
     return dict(locals())
 
 
 def instrument(
-    calibration: Calibration = 0.0,
-    source_angle: SourceAngle = 0.0,
-    receiver_angle: ReceiverAngle = 0.0,
-    dark: Dark = "0",
+    calibration: CalibrationFlag = 0.0,
+    source_angle: SourceAngleFlag = 0.0,
+    receiver_angle: ReceiverAngleFlag = 0.0,
+    dark: DarkFlag = "0",
 ) -> Any:
     """The `fitmat.measurements.instrument.Instrument` that the flags describe.
 

@@ -8,14 +8,14 @@ from typing import Annotated, Literal
 
 import typer
 
-File = Annotated[
+FileFlag = Annotated[
     Path,
     typer.Argument(
         help="Measurements: CSV or any text table, Parquet, MERL, RGL, Zemax, LightTools, FRED, ASTM, UTIA, ALTA, SSDD."
     ),
 ]
 
-Models = Annotated[
+ModelsFlag = Annotated[
     str,
     typer.Option(
         help="Models to fit, separated by commas, or 'all'; see [bold]fitmat models[/bold]. An empirical and a "
@@ -25,7 +25,7 @@ Models = Annotated[
     ),
 ]
 
-Out = Annotated[
+OutFlag = Annotated[
     Path | None,
     typer.Option(
         help="Folder for the report; default NAME-fitmat (then -2, -3, …) beside the input.",
@@ -34,22 +34,24 @@ Out = Annotated[
     ),
 ]
 
-Force = Annotated[bool, typer.Option("--force", help="Replace the report of an earlier run in --out.")]
+ForceFlag = Annotated[bool, typer.Option("--force", help="Replace the report of an earlier run in --out.")]
 
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
+JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
 
-NoMcmc = Annotated[
+NoMcmcFlag = Annotated[
     bool, typer.Option("--no-mcmc", help="Skip sampling: faster, intervals from Laplace's approximation.")
 ]
 
-Seed = Annotated[int, typer.Option(min=0, help="Seed of the sampling; the same seed, the same report.", metavar="N")]
+SeedFlag = Annotated[
+    int, typer.Option(min=0, help="Seed of the sampling; the same seed, the same report.", metavar="N")
+]
 
-Fix = Annotated[
+FixFlag = Annotated[
     list[str] | None,
     typer.Option(help="Hold a parameter, e.g. ks=1; repeat for more.", metavar="NAME=VALUE", show_default=False),
 ]
 
-Masking = Annotated[
+MaskingFlag = Annotated[
     str | None,
     typer.Option(
         help="Shadowing of microfacet lobes: correlated (default), separable or v-cavity.",
@@ -58,26 +60,26 @@ Masking = Annotated[
     ),
 ]
 
-Plot = Annotated[
+PlotFlag = Annotated[
     Path | None,
     typer.Option(help="Draw what was measured where into this PNG, SVG or PDF.", metavar="FILE", show_default=False),
 ]
 
-DesignPlot = Annotated[
+DesignPlotFlag = Annotated[
     Path | None,
     typer.Option(
         help="Draw what each next angle is worth into this PNG, SVG or PDF.", metavar="FILE", show_default=False
     ),
 ]
 
-Converted = Annotated[
+ConvertedFlag = Annotated[
     Path,
     typer.Argument(help="File to write: .csv, .parquet, .binary (MERL), .bsdf (Zemax) or .alta.", show_default=False),
 ]
 
-Replace = Annotated[bool, typer.Option("--force", help="Replace the file where it exists.")]
+ReplaceFlag = Annotated[bool, typer.Option("--force", help="Replace the file where it exists.")]
 
-Loss = Annotated[
+LossFlag = Annotated[
     str,
     typer.Option(
         help="What the fit minimises, see [bold]fitmat losses[/bold]: default, gaussian, student-t, mixture, log10 "
@@ -86,7 +88,7 @@ Loss = Annotated[
     ),
 ]
 
-Prior = Annotated[
+PriorFlag = Annotated[
     list[str] | None,
     typer.Option(
         help="What is known beforehand: centre and standard deviation, e.g. eta=1.5,0.05; repeat for more.",
@@ -95,7 +97,7 @@ Prior = Annotated[
     ),
 ]
 
-CheckPosterior = Annotated[
+CheckPosteriorFlag = Annotated[
     bool,
     typer.Option(
         "--check-posterior",
@@ -103,7 +105,7 @@ CheckPosterior = Annotated[
     ),
 ]
 
-For = Annotated[
+ForFlag = Annotated[
     str | None,
     typer.Option(
         "--for",
@@ -113,13 +115,13 @@ For = Annotated[
     ),
 ]
 
-Kind = Annotated[
+KindFlag = Annotated[
     Literal["sample", "curve"], typer.Option(help="What is measured next: single samples, or whole curves.")
 ]
 
-Count = Annotated[int, typer.Option(min=1, max=50, help="How many measurements to propose.", metavar="N")]
+CountFlag = Annotated[int, typer.Option(min=1, max=50, help="How many measurements to propose.", metavar="N")]
 
-Ior = Annotated[
+IorFlag = Annotated[
     str | None,
     typer.Option(
         help="Material whose refractive index is fixed from the literature: Au, N-BK7, PMMA, or shelf/book/page of "
@@ -129,15 +131,15 @@ Ior = Annotated[
     ),
 ]
 
-Tilt = Annotated[
+TiltFlag = Annotated[
     bool, typer.Option("--tilt", help="Fit how far the sample's normal leans in its mount, with every model.")
 ]
 
-Model = Annotated[str | None, typer.Argument(help="True model, e.g. lambert+ggx.", show_default=False)]
+ModelFlag = Annotated[str | None, typer.Argument(help="True model, e.g. lambert+ggx.", show_default=False)]
 
-SimulatedOut = Annotated[Path, typer.Option(help="CSV file to write.")]
+SimulatedOutFlag = Annotated[Path, typer.Option(help="CSV file to write.")]
 
-Set = Annotated[
+SetFlag = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
@@ -147,9 +149,9 @@ Set = Annotated[
     ),
 ]
 
-ThetaI = Annotated[str, typer.Option(help="Incidence angles in degrees, as --theta-o.", metavar="ANGLES")]
+ThetaIFlag = Annotated[str, typer.Option(help="Incidence angles in degrees, as --theta-o.", metavar="ANGLES")]
 
-ThetaO = Annotated[
+ThetaOFlag = Annotated[
     str,
     typer.Option(
         help="Outgoing angles in degrees, FIRST:LAST:STEP or a list A,B,C; positive = mirror side.",
@@ -157,27 +159,29 @@ ThetaO = Annotated[
     ),
 ]
 
-Phi = Annotated[
+PhiFlag = Annotated[
     str, typer.Option(help="Relative azimuths in degrees; 180 is the plane of incidence.", metavar="ANGLES")
 ]
 
-PhiI = Annotated[str, typer.Option(help="Azimuths of incidence in degrees, for anisotropic samples.", metavar="ANGLES")]
+PhiIFlag = Annotated[
+    str, typer.Option(help="Azimuths of incidence in degrees, for anisotropic samples.", metavar="ANGLES")
+]
 
-Noise = Annotated[float, typer.Option(min=0, help="Relative noise, as a fraction of the true value.", metavar="X")]
+NoiseFlag = Annotated[float, typer.Option(min=0, help="Relative noise, as a fraction of the true value.", metavar="X")]
 
-Floor = Annotated[float, typer.Option(min=0, help="Absolute noise in sr⁻¹.", metavar="X")]
+FloorFlag = Annotated[float, typer.Option(min=0, help="Absolute noise in sr⁻¹.", metavar="X")]
 
-SimulatedSeed = Annotated[int, typer.Option(min=0, help="Seed of the noise.", metavar="N")]
+SimulatedSeedFlag = Annotated[int, typer.Option(min=0, help="Seed of the noise.", metavar="N")]
 
-Catalogue = Annotated[
+CatalogueFlag = Annotated[
     Path | None,
     typer.Option(help="Write the catalogue of synthetic materials into this folder instead.", show_default=False),
 ]
 
-Name = Annotated[
+NameFlag = Annotated[
     str | None, typer.Argument(help="A lobe or model, e.g. ggx or lambert+ggx; 'fresnel' for the Fresnel terms.")
 ]
 
-Check = Annotated[
+CheckFlag = Annotated[
     bool, typer.Option("--check", help="Measure which laws of reflection every lobe keeps (some minutes).")
 ]

@@ -27,7 +27,7 @@ from fitmat.fitting.likelihood import (
 )
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.losses import loss as find_loss
-from fitmat.fitting.priors import prepared
+from fitmat.fitting.priors import prepare_prior
 from fitmat.fitting.result import Ends, Fit, conclude
 from fitmat.fitting.starts import starting_points
 from fitmat.maths.least_squares import Minimum, Units, least_squares
@@ -110,7 +110,7 @@ def fit(
             f"{measurements.source}: the loss {chosen.name} needs the noise, and it is not known; give a column sigma, "
             f"or choose another loss (default infers what is needed)."
         )
-    data = prepare(measurements, found_noise, prepared(shown, measurements.instrument, known), chosen)
+    data = prepare(measurements, found_noise, prepare_prior(shown, measurements.instrument, known), chosen)
     usable = int(np.count_nonzero(data.weight))
     if usable < needed:
         raise FitmatError(

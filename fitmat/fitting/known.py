@@ -86,7 +86,7 @@ def tilted(name: str, measurements: Measurements) -> Known:
     return {f"tilt{OVER}{name}": {axis: np.zeros(1) for axis, held in across.items() if held}}
 
 
-def prepared(names: list[str], measurements: Measurements, *, ior: str | None, tilt: bool) -> Known:
+def prepare_known(names: list[str], measurements: Measurements, *, ior: str | None, tilt: bool) -> Known:
     """The models of a study with what is known of the sample; models without a refractive index stay as they are.
 
     Raises:

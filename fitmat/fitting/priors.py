@@ -26,7 +26,7 @@ DISCREPANCY = "discrepancy"
 """Name under which s has a prior: centre 0, and the sd of a Gaussian of which s is the size (half-normal)."""
 
 
-def prepared(
+def prepare_prior(
     model: AbstractBRDF, instrument: Instrument, given: Mapping[str, tuple[ArrayLike, ArrayLike]]
 ) -> Prior | None:
     """Stated priors, and the calibration's, in natural coordinates; None where everything is flat.

@@ -20,7 +20,7 @@ from fitmat.errors import FitmatError
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.fitting import fit
 from fitmat.fitting.likelihood import log_pointwise
-from fitmat.fitting.priors import DISCREPANCY, draw, prepared
+from fitmat.fitting.priors import DISCREPANCY, draw, prepare_prior
 from fitmat.fitting.result import Fit
 from fitmat.judgement.multiplicity import adjusted_for_many
 from fitmat.judgement.prediction import as_numpy, predictions, replicated
@@ -145,7 +145,7 @@ def calibrate(
     rng = np.random.default_rng(seed)
     template = _centre(model(name, channels=len(geometry.channels)), priors)
     sigma = np.hypot(noise[1], noise[0] * evaluate(template, geometry.wi, geometry.wo))
-    free, prior = coordinates(template).index, prepared(template, IDEAL, priors)
+    free, prior = coordinates(template).index, prepare_prior(template, IDEAL, priors)
     truths, s = draw(template, prior, free, simulations, rng)
     kappa, normal = geometry.wi[:, 2:3], rng.normal(size=(simulations, *sigma.shape))
     exact = values(template, truths, geometry.wi, geometry.wo) * kappa

@@ -182,7 +182,7 @@ def _solve(
     return mapped(refined, first)
 
 
-class Rows(eqx.Module):
+class Target(eqx.Module):
     """Pairs of directions with what is imitated there.
 
     Attributes:
@@ -214,7 +214,7 @@ def _transformed(metric: Array, f: Array, wi: Array, wo: Array) -> Array:
     return jax.lax.switch(metric, branches, f)
 
 
-def _rows(source: AbstractBRDF, metric: Array) -> Rows:
+def _rows(source: AbstractBRDF, metric: Array) -> Target:
     """The quadrature, dense where the imitated lobe is."""
     theta, solid = incidence_panels()
     turns = jnp.zeros(1) if source.isotropic else (jnp.arange(AZIMUTHS) + 0.5) * jnp.pi / AZIMUTHS
@@ -233,10 +233,10 @@ def _rows(source: AbstractBRDF, metric: Array) -> Rows:
     relative = jnp.asarray([METRICS[name].kind == "relative" for name in LEAST_SQUARES])[metric]
     norm = weight @ jnp.where(relative, (f**2).mean(axis=1), 1.0)
     target, slope = jax.jvp(lambda f: _transformed(metric, f, wi, wo), (f,), (jnp.ones_like(f),))
-    return Rows(wi, wo, jnp.sqrt(weight / norm / f.shape[1])[:, None], target, slope, f, metric)
+    return Target(wi, wo, jnp.sqrt(weight / norm / f.shape[1])[:, None], target, slope, f, metric)
 
 
-def _weighted(template: AbstractBRDF, node: Array, places: Array, rows: Rows) -> Array:
+def _weighted(template: AbstractBRDF, node: Array, places: Array, rows: Target) -> Array:
     """The node with its weights solved, the transform taken as straight about the imitated values."""
 
     def value(p: Array) -> Array:

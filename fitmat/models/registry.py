@@ -41,7 +41,7 @@ OVER = "-over-"
 FRESNELS = (Dielectric, Schlick, F82, Conductor, Belcour)
 """Fresnel terms that any microfacet lobe can carry, in the order of their suffixes in `fitmat models`."""
 
-Kind = Literal["diffuse", "empirical", "microfacet", "cover"]
+LobeKind = Literal["diffuse", "empirical", "microfacet", "cover"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Lobe:
     """
 
     shape: Callable[..., AbstractBRDF]
-    kind: Kind
+    kind: LobeKind
     parts: Mapping[str, type[eqx.Module]] = dataclasses.field(default_factory=dict)
 
     def defaults(self) -> dict[str, tuple[Param, float]]:

@@ -33,24 +33,24 @@ CROWDED = 60
 """Curves of more points than this are drawn without markers."""
 
 
-def plot_examination(examination: Examination, *, channel: int | None = None) -> Figure:
+def examination(found: Examination, *, channel: int | None = None) -> Figure:
     """Maps of the hemisphere for up to `MAPS` incidences, and the in-plane curves where there are any.
 
     Args:
-        examination: From `examine`.
+        found: From `examine`.
         channel: Which channel; the one with most valid samples if None.
     """
-    m = examination.measurements
-    chosen = drawn(examination)
+    m = found.measurements
+    chosen = drawn(found)
     k = int(m.valid.sum(axis=0).argmax()) if channel is None else channel
-    curves = [i for i in chosen if len(in_plane_curve(m, i, k)[0]) >= 3] if not examination.coverage.scattered else []
+    curves = [i for i in chosen if len(in_plane_curve(m, i, k)[0]) >= 3] if not found.coverage.scattered else []
     columns = len(chosen) if len(chosen) <= BESIDE else 3
     lines = max(math.ceil(len(chosen) / max(columns, 1)), 1)
     above, below = _parts(len(chosen), (5.4 / max(columns, 1) + 0.45) * lines + 0.5, bool(curves))
     sheet = above.figure if isinstance(above, SubFigure) else above
-    _maps(above, examination, chosen, k, (lines, columns))
+    _maps(above, found, chosen, k, (lines, columns))
     if below is not None:
-        plot_curves(examination, curves, k, below.add_subplot())
+        plot_curves(found, curves, k, below.add_subplot())
     name = f", channel {m.channels[k]}" if len(m.channels) > 1 else ""
     sheet.suptitle(f"{m.source}{name}", fontsize=10)
     return sheet

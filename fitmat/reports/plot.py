@@ -19,6 +19,7 @@ from fitmat.match.discernibility import SEPARATED, Telling
 from fitmat.match.match import Match
 from fitmat.match.regions import REGIONS
 from fitmat.maths.directions import signed_zenith
+from fitmat.reports.examination_plots import examination as examination
 from fitmat.studies.findings import Findings
 from fitmat.studies.study import Study
 from fitmat.uncertainty.posterior import Posterior

@@ -76,7 +76,7 @@ def plan(
         ModelError: a name is unknown, or something given concerns no model.
     """
     names = model_names(asked, measurements)
-    prepared = known.prepared(names, measurements, ior=ior, tilt=tilt)
+    prepared = known.prepare_known(names, measurements, ior=ior, tilt=tilt)
     having = {name: {e.name for e in entries(model(name))} | _BESIDE for name in prepared}
     for flag, given in (("--fix", fixed or {}), ("--prior", priors or {})):
         _refuse_foreign(flag, given, having)

@@ -5,7 +5,7 @@ import pytest
 
 import fitmat as fm
 from fitmat.errors import ModelError
-from fitmat.fitting.known import of_material, prepared, tilted
+from fitmat.fitting.known import of_material, prepare_known, tilted
 from fitmat.models.simulation import simulate
 
 JOHNSON_CHRISTY = 2e-2
@@ -81,8 +81,8 @@ def test_both_tilts_are_free_off_the_plane() -> None:
 
 def test_models_without_an_index_stay_as_they_are() -> None:
     """Where at least one has one."""
-    known = prepared(["lambert+phong", "lambert+ggx"], _plane(0.0), ior="Au", tilt=True)
+    known = prepare_known(["lambert+phong", "lambert+ggx"], _plane(0.0), ior="Au", tilt=True)
     assert list(known) == ["tilt-over-lambert+phong", "tilt-over-lambert+ggx-conductor"]
     assert set(known["tilt-over-lambert+ggx-conductor"]) == {"eta", "kappa", "tilt_y"}
     with pytest.raises(ModelError, match="no lobe with a refractive index"):
-        prepared(["lambert"], _plane(0.0), ior="Au", tilt=False)
+        prepare_known(["lambert"], _plane(0.0), ior="Au", tilt=False)

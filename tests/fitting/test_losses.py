@@ -83,7 +83,7 @@ def test_an_objective_is_the_one_of_the_literature(made: fm.Measurements, name: 
 
 
 def test_the_reported_e2_is_the_one_that_its_loss_minimises() -> None:
-    """A dark surface of which a third of the readings are below 0; were they taken for 0, E2 would ask for more light."""
+    """A dark surface with readings below 0; were they taken for 0, E2 would ask for more light."""
     theta_o = np.tile(ANGLES[1], 3)
     theta_i, dark = np.repeat(ANGLES[0], len(ANGLES[1])), 0.05
     m = fm.from_arrays(theta_i, theta_o, dark + 0.1 * np.random.default_rng(3).normal(size=len(theta_i)))

@@ -37,7 +37,7 @@ def test_a_stated_prior_and_the_data_join_by_their_precision(made: fm.Measuremen
 def test_a_log_parameter_has_a_log_normal_prior() -> None:
     """Median and relative sd as stated: the density of ln α is Gaussian."""
     model = fm.model("ggx")
-    found = priors.prepared(model, IDEAL, {"alpha": (0.2, 0.05)})
+    found = priors.prepare_prior(model, IDEAL, {"alpha": (0.2, 0.05)})
     assert found is not None
     at = next(e.place.start for e in entries(model) if e.name == "alpha")
     np.testing.assert_allclose([found.mean[at], found.precision[at]], [np.log(0.2), 4.0], rtol=1e-12)
@@ -46,7 +46,7 @@ def test_a_log_parameter_has_a_log_normal_prior() -> None:
 def test_draws_follow_the_truncated_prior() -> None:
     """kd ~ N(0.02, 0.03) within 0 … 1, α flat in its logarithm, s half-normal: Kolmogorov–Smirnov."""
     model = fm.model("lambert+ggx")
-    prior = priors.prepared(model, IDEAL, {"kd": (0.02, 0.03), "discrepancy": (0.0, 0.1)})
+    prior = priors.prepare_prior(model, IDEAL, {"kd": (0.02, 0.03), "discrepancy": (0.0, 0.1)})
     places = {e.name: e.place.start for e in entries(model)}
     free = np.array([places["kd"], places["alpha"]])
     values, s = priors.draw(model, prior, free, 4000, np.random.default_rng(0))
@@ -79,7 +79,7 @@ def test_the_discrepancy_can_be_held_down(made: fm.Measurements) -> None:
 
 def test_words_say_what_was_believed() -> None:
     model = fm.model("lambert+ggx")
-    prior = priors.prepared(model, IDEAL, {"eta": (1.5, 0.05)})
+    prior = priors.prepare_prior(model, IDEAL, {"eta": (1.5, 0.05)})
     said = priors.words(model, prior)
     assert said["eta"] == ("1.500 ± 0.050",)
     assert said["kd"] == ("0 – 1",)
@@ -98,7 +98,7 @@ def test_words_say_what_was_believed() -> None:
 )
 def test_impossible_priors_are_refused(given: dict, sentence: str) -> None:
     with pytest.raises(ModelError, match=sentence):
-        priors.prepared(fm.model("lambert+ggx"), IDEAL, given)
+        priors.prepare_prior(fm.model("lambert+ggx"), IDEAL, given)
 
 
 def test_texts_of_the_command_line() -> None:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 import fitmat as fm
 from fitmat.judgement.examination.examining import Examination, examine
-from fitmat.reports.examination_plots import MAPS, drawn, plot_examination
+from fitmat.reports.examination_plots import MAPS, drawn, examination
 
 TRUTH = {"kd": np.array([0.3, 0.1]), "alpha": 0.1, "eta": 1.5}
 LIGHT = (10.0, 30.0, 50.0)
@@ -42,7 +42,7 @@ def points(sheet: Figure) -> list[np.ndarray]:
 
 @pytest.mark.parametrize(("channel", "counts"), [(None, [33, 33, 33]), (0, [33, 33, 33]), (1, [32, 33, 33])])
 def test_every_valid_sample_is_on_its_map(plane: Examination, channel: int | None, counts: list[int]) -> None:
-    sheet = plot_examination(plane, channel=channel)
+    sheet = examination(plane, channel=channel)
     maps = points(sheet)
     assert [len(found) for found in maps] == counts
     for found in maps:
@@ -53,7 +53,7 @@ def test_every_valid_sample_is_on_its_map(plane: Examination, channel: int | Non
 
 def test_maps_mark_the_light_and_the_mirror_direction(plane: Examination) -> None:
     """The mirror side is to the right: azimuth 0; the light stands opposite."""
-    maps = [ax for ax in plot_examination(plane).axes if ax.name == "polar"]
+    maps = [ax for ax in examination(plane).axes if ax.name == "polar"]
     for ax, light in zip(maps, LIGHT, strict=True):
         marks = {str(line.get_label()): np.asarray(line.get_xydata())[0] for line in ax.lines}
         assert marks["mirror direction"] == pytest.approx([0.0, light])
@@ -63,7 +63,7 @@ def test_maps_mark_the_light_and_the_mirror_direction(plane: Examination) -> Non
 
 
 def test_curves_show_every_sample_and_the_mirror_directions(plane: Examination) -> None:
-    ax = plot_examination(plane).axes[-1]
+    ax = examination(plane).axes[-1]
     lines = {
         str(line.get_label()): np.asarray(line.get_xydata()) for line in ax.lines if np.size(line.get_xydata()) > 4
     }
@@ -84,7 +84,7 @@ def test_curves_show_every_sample_and_the_mirror_directions(plane: Examination) 
 def test_decades_are_drawn_on_a_logarithmic_axis(plane: Examination) -> None:
     m = plane.measurements
     steep = examine(dataclasses.replace(m, value=m.value**4))
-    ax = plot_examination(steep).axes[-1]
+    ax = examination(steep).axes[-1]
     assert ax.get_yscale() == "log"
     assert ax.get_ylim()[0] < steep.measurements.value[:, 0].min()
     assert ax.get_ylim()[1] > steep.measurements.value[:, 0].max()
@@ -95,13 +95,13 @@ def test_many_incidences_are_chosen_evenly() -> None:
     chosen = [round(float(np.rad2deg(i.theta_i))) for i in drawn(found)]
     assert len(chosen) == MAPS
     assert (chosen[0], chosen[-1]) == (0, 80)
-    assert len(points(plot_examination(found))) == MAPS
+    assert len(points(examination(found))) == MAPS
 
 
 def test_scattered_samples_have_maps_only(hemisphere) -> None:
     wi, wo = hemisphere(20_000, 1), hemisphere(20_000, 2)
     value = np.full((20_000, 1), 0.1)
-    sheet = plot_examination(examine(fm.Measurements(wi, wo, value, None, value > 0, ("value",))))
+    sheet = examination(examine(fm.Measurements(wi, wo, value, None, value > 0, ("value",))))
     assert {ax.name for ax in sheet.axes} == {"polar", "rectilinear"}
     assert [ax.get_ylabel() for ax in sheet.axes if ax.name == "rectilinear"] == ["BRDF / sr⁻¹"]  # the bar of colours
 
@@ -110,11 +110,11 @@ def test_scattered_samples_have_maps_only(hemisphere) -> None:
 def test_odd_files_are_drawn(value: float, tmp_path: Path) -> None:
     """Nothing valid, black, negative, a single sample; all the way to a picture."""
     m = fm.from_arrays([0.5], [0.5], [value])
-    sheet = plot_examination(examine(m))
+    sheet = examination(examine(m))
     sheet.savefig(tmp_path / "picture.png")
     assert len(points(sheet)) == (0 if np.isnan(value) else 1)
 
 
 def test_pictures_can_be_saved_without_a_warning(plane: Examination, tmp_path: Path) -> None:
-    plot_examination(plane).savefig(tmp_path / "picture.png")
-    plot_examination(examine(measured((30.0,)))).savefig(tmp_path / "one.png")
+    examination(plane).savefig(tmp_path / "picture.png")
+    examination(examine(measured((30.0,)))).savefig(tmp_path / "one.png")

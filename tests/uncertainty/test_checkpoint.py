@@ -16,7 +16,7 @@ import pytest
 
 import fitmat as fm
 from fitmat.errors import FitmatError, OutputError
-from fitmat.fitting.priors import prepared
+from fitmat.fitting.priors import prepare_prior
 from fitmat.fitting.result import Fit
 from fitmat.uncertainty import chains, checkpoint
 from fitmat.uncertainty.chains import CHUNK, resumable_steps
@@ -167,7 +167,7 @@ def test_parts_count_only_in_their_order(fit: Fit, whole: Posterior, kept: Path)
 
 def test_checkpoints_of_another_run_are_refused(fit: Fit, kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     moved = dataclasses.replace(fit, data=dataclasses.replace(fit.data, x=fit.data.x.at[7].multiply(1 + 1e-12)))
-    prior = prepared(fit.model, fit.measurements.instrument, {"kd": (0.3, 0.2)})
+    prior = prepare_prior(fit.model, fit.measurements.instrument, {"kd": (0.3, 0.2)})
     informed = dataclasses.replace(fit, data=dataclasses.replace(fit.data, prior=prior))
     refused = r"kept holds checkpoints of another run: other data, model, priors, .*; remove that folder, or name"
     for other in (moved, informed):

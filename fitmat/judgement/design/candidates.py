@@ -13,7 +13,7 @@ from fitmat.fitting.result import Fit
 from fitmat.judgement.prediction import sections
 from fitmat.maths.directions import from_angles
 
-Kind = Literal["sample", "curve"]
+Measured = Literal["sample", "curve"]
 """A single sample, or one incidence with a scan of theta_o."""
 
 STEP = 5.0
@@ -79,7 +79,7 @@ class Candidates:
         return found
 
 
-def proposed(fit: Fit, kind: Kind, limits: Limits) -> Candidates:
+def proposed(fit: Fit, kind: Measured, limits: Limits) -> Candidates:
     """Every candidate that the limits allow; the azimuth of incidence is turned where the model is anisotropic.
 
     Args:

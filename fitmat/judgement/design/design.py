@@ -17,7 +17,7 @@ from jaxtyping import Float
 
 from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
-from fitmat.judgement.design.candidates import Candidates, Kind, Limits, proposed
+from fitmat.judgement.design.candidates import Candidates, Limits, Measured, proposed
 from fitmat.judgement.design.filters import Bank, Task, bank, scores
 from fitmat.measurements.noise import noise_law
 from fitmat.uncertainty.posterior import Posterior
@@ -80,7 +80,7 @@ class Design:
     fit: Fit
     rival: Fit | None
     target: str | None
-    kind: Kind
+    kind: Measured
     names: tuple[str, ...]
     sd: Float[np.ndarray, " f"]
     truths: Float[np.ndarray, "t f"]

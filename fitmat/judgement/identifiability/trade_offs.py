@@ -81,8 +81,8 @@ def _f0(v: Values) -> np.ndarray:
     return f0_from_ior(v["eta"], v["kappa"]) if "kappa" in v else f0_from_eta(v["eta"])
 
 
-Rule = tuple[str, str, frozenset[str], Callable[[Values], np.ndarray]]
-NAMED: tuple[Rule, ...] = (
+Combined = tuple[str, str, frozenset[str], Callable[[Values], np.ndarray]]
+NAMED: tuple[Combined, ...] = (
     ("ks·F0", "the strength of the highlight seen head on", frozenset({"ks", "eta"}), lambda v: v["ks"] * _f0(v)),
     ("ks·F0", "the strength of the highlight seen head on", frozenset({"ks", "f0"}), lambda v: v["ks"] * _f0(v)),
     ("ks·F0/α²", "the height of the highlight", frozenset({"ks", "eta", "alpha"}),

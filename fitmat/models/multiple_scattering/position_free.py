@@ -24,7 +24,7 @@ from fitmat.models.multiple_scattering.random_walk import (
     Step,
     Sums,
     follow,
-    planned,
+    plan_paths,
     roulette,
 )
 from fitmat.models.multiple_scattering.surface import (
@@ -57,7 +57,7 @@ def evaluate_slab(
     """
     if surface.transmits:
         raise ModelError("the surface transmits, and refracted light leaves the half space: take evaluate_walk.")
-    plan = planned(wi, wo, samples=samples, order=order)
+    plan = plan_paths(wi, wo, samples=samples, order=order)
     first = np.asarray(_first(surface, plan.wi, plan.wo))[..., 0].T * (order in (None, 1))
     if order == 1:
         return MonteCarlo(first, np.zeros_like(first), np.zeros(len(first)), plan.static.lanes * plan.static.quota)

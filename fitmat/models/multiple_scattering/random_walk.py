@@ -100,7 +100,7 @@ def evaluate_walk(
         >>> evaluate_walk(white, up, up, samples=10_000, seed=1).value.round(1)
         array([[0.4]])
     """
-    plan = planned(wi, wo, samples=samples, order=order)
+    plan = plan_paths(wi, wo, samples=samples, order=order)
     return plan.result(
         _evaluate(surface, plan.wi, plan.wo, plan.orders, jax.random.key(seed, impl=GENERATOR), plan.static), plan.wo[2]
     )
@@ -112,7 +112,7 @@ def albedo_walk(surface: Surface, wi: ArrayLike, *, samples: int, seed: int) -> 
     A surface that absorbs nothing gives 1 in total without any noise: each path ends on one side or the other.
     Arguments and errors as for `evaluate_walk`.
     """
-    plan = planned(wi, wi, samples=samples, order=None)
+    plan = plan_paths(wi, wi, samples=samples, order=None)
     both = plan.result(
         _evaluate(surface, plan.wi, None, plan.orders, jax.random.key(seed, impl=GENERATOR), plan.static)
     )
@@ -163,7 +163,7 @@ class Plan:
         return MonteCarlo(score.mean(axis=-1).T, error.T, np.asarray(sums.cut).mean(axis=-1) / quota, lanes * quota)
 
 
-def planned(wi: ArrayLike, wo: ArrayLike, *, samples: int, order: int | None) -> Plan:
+def plan_paths(wi: ArrayLike, wo: ArrayLike, *, samples: int, order: int | None) -> Plan:
     """Check the inputs of an estimator and share its paths among lanes; see `evaluate_walk`."""
     pair = [np.asarray(w, float) for w in (wi, wo)]
     if pair[0].shape != pair[1].shape or pair[0].ndim != 2 or pair[0].shape[1] != 3 or len(pair[0]) == 0:
