@@ -8,8 +8,8 @@ from jaxtyping import Float
 
 from fitmat.fitting.result import Fit
 from fitmat.measurements.incidences import incidences
-from fitmat.models.base import evaluate
 from fitmat.models.metrics import METRICS, above_minus_one, within
+from fitmat.models.values import at
 
 
 def fit_metrics(fit: Fit) -> dict[str, float | None]:
@@ -22,7 +22,7 @@ def fit_metrics(fit: Fit) -> dict[str, float | None]:
         noise. None where no value is left.
     """
     m = fit.measurements
-    predicted, measured = evaluate(fit.model, m.wi, m.wo), np.where(m.valid, m.value, 0.0)
+    predicted, measured = at(fit.model, m.wi, m.wo), np.where(m.valid, m.value, 0.0)
     kept = {
         "cube-root": m.valid,
         "log-ratio": m.valid,

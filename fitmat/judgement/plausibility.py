@@ -9,7 +9,8 @@ import numpy as np
 from fitmat.fitting.result import Fit
 from fitmat.models.albedo import albedo
 from fitmat.models.around.shown import surface
-from fitmat.models.base import AbstractBRDF, evaluate
+from fitmat.models.base import AbstractBRDF
+from fitmat.models.values import at
 
 ANGLES = np.deg2rad([0.0, 30.0, 60.0, 75.0, 85.0])
 """Incidence angles of the albedo, radians."""
@@ -53,7 +54,7 @@ def _reciprocal(model: AbstractBRDF) -> bool:
     wi, wo = w[::2], w[1::2].copy()
     wo[::2] = (wi * [-1.0, -1.0, 1.0])[::2] + np.array([0.0, 0.0, 0.02])
     wo /= np.linalg.norm(wo, axis=1, keepdims=True)
-    there, back = np.split(evaluate(model, np.concatenate([wi, wo]), np.concatenate([wo, wi])), 2)
+    there, back = np.split(at(model, np.concatenate([wi, wo]), np.concatenate([wo, wi])), 2)
     return bool(np.all(np.abs(there - back) <= ROUNDING * (np.abs(there) + np.abs(back))))
 
 

@@ -6,22 +6,19 @@ Gives arrays; draws nothing.
 import dataclasses
 from collections.abc import Iterator
 
-import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtri
 
-from fitmat.fitting.likelihood import Data, residuals
+from fitmat.fitting.likelihood import Data, misfits
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.result import Fit
 from fitmat.fitting.stabilising import from_stabilised, stabilised
 from fitmat.maths.directions import from_angles
 from fitmat.measurements.samples import Measurements
 from fitmat.models.around.noise import Noisy
-from fitmat.models.base import evaluate
-from fitmat.models.values import drawn, slices, values
+from fitmat.models.values import at, drawn, slices, values
 from fitmat.uncertainty.posterior import Posterior
 
 BAND_DRAWS = 200
@@ -48,7 +45,10 @@ class Section:
 
 
 def sections(m: Measurements, most: int = 8) -> list[Section]:
-    """In-plane curves with at least three valid samples, by incidence; `most` of them, evenly spread."""
+    """In-plane curves with at least three valid samples, by direction of incidence; `most` of them, evenly spread.
+
+    Unlike `incidences`, which looks at the angle only, each azimuth is a curve of its own: a band is drawn along one.
+    """
     usable = np.flatnonzero(m.in_plane & m.valid.any(axis=1))
     light = np.round(np.rad2deg(np.stack([m.theta_i, m.phi_i], axis=1)[usable]), 2) % 360.0
     found = []
@@ -66,7 +66,7 @@ def curve(fit: Fit, section: Section, theta_o: Float[np.ndarray, " k"]) -> Float
     """The fitted BRDF in sr⁻¹ along the plane of a section; signed theta_o, radians."""
     wi = from_angles(np.full_like(theta_o, section.theta_i), np.full_like(theta_o, section.phi_i))
     wo = from_angles(np.abs(theta_o), section.phi_i + np.where(theta_o >= 0, np.pi, 0.0))
-    return evaluate(fit.model, wi, wo)
+    return at(fit.model, wi, wo)
 
 
 def standardised_residuals(fit: Fit, *, misfit: bool = True) -> Float[np.ndarray, "n c"]:
@@ -76,11 +76,10 @@ def standardised_residuals(fit: Fit, *, misfit: bool = True) -> Float[np.ndarray
         fit: Under any loss: the transform is the default's, so that all are comparable.
         misfit: Whether the misfit counts; else in standard deviations of the noise alone.
     """
-    s = jnp.asarray(fit.misfit if misfit else 0.0)
-    return np.asarray(_residuals(fit.model, fit.data.under(DEFAULT), s))
-
-
-_residuals = eqx.filter_jit(residuals)
+    data = as_numpy(fit.data.under(DEFAULT))
+    wi, wo, kappa = (np.asarray(part) for part in (data.wi, data.wo, data.kappa))
+    s = np.asarray(fit.misfit if misfit else 0.0)
+    return misfits(at(fit.model, wi, wo) * kappa, data.noise, data, s)
 
 
 def predictive_band(posterior: Posterior, rows: np.ndarray) -> Float[np.ndarray, "2 k c"]:

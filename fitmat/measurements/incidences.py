@@ -58,5 +58,5 @@ def incidences(
         ends = SAME_DEG * angles[group[0]], SAME_DEG * angles[group[-1]]
         name = f"{ends[0]:.4g}°" if len(group) == 1 else f"{ends[0]:.4g}–{ends[1]:.4g}°"
         inside = order[first[group[0]] : np.append(first, len(order))[group[-1] + 1]]
-        found.append(Incidence(name, float(degrees[inside].mean()), rows[np.sort(inside)]))
+        found.append(Incidence(name, float(np.round(degrees[inside].mean(), 6)), rows[np.sort(inside)]))
     return tuple(found)

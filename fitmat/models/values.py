@@ -65,6 +65,11 @@ def values(
     return found
 
 
+def at(model: AbstractBRDF, wi: Float[np.ndarray, "n 3"], wo: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n c"]:
+    """`values` at the model's own parameters."""
+    return values(model, numbers(model)[None], wi, wo)[0]
+
+
 def blocks(
     parts: Sequence[Draws], pairs: Sequence[tuple[np.ndarray, np.ndarray]]
 ) -> Iterator[tuple[slice, int, list[np.ndarray]]]:

@@ -70,7 +70,7 @@ def test_many_readings_are_thinned_and_many_incidences_grouped(fit: Fit) -> None
     found = told(dataclasses.replace(fit, measurements=many, noise=sigma), 0.105, 0.1)
     assert len(many.wi) > ROWS
     assert found.every.value == pytest.approx(0.5 * np.sqrt(9000), rel=1e-9)
-    np.testing.assert_allclose(found.theta_i_deg, np.arange(2.0, 90.0, 5.0))
+    np.testing.assert_allclose(found.theta_i_deg, np.arange(2.0, 90.0, 5.0), atol=0.02)  # thinned unevenly
     assert found.readings.sum() == pytest.approx(9000, abs=10)
 
 

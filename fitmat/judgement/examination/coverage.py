@@ -41,6 +41,9 @@ DIRECTIONS = 2000
 class Incidence:
     """The samples of one angle of incidence, whatever its azimuth; angles in radians.
 
+    Unlike `measurements.incidences`, which shares all samples out among groups, these are settings of the instrument
+    that a file is described at: of many some are left out, and of a scattered file what lies between them.
+
     Attributes:
         theta_i: Zenith angle of incidence.
         rows: Indices into the measurements, (k,).
