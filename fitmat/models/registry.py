@@ -14,6 +14,7 @@ from jaxtyping import ArrayLike
 
 from fitmat.errors import ModelError
 from fitmat.models.around.coat import RoughCoat, SmoothCoat, Varnish
+from fitmat.models.around.plastic import Plastic
 from fitmat.models.around.tilt import Tilted
 from fitmat.models.base import AbstractBRDF, Sum
 from fitmat.models.lobes.abg import ABg
@@ -27,7 +28,6 @@ from fitmat.models.lobes.lambert import Lambert
 from fitmat.models.lobes.microfacet import Microfacet
 from fitmat.models.lobes.oren_nayar import EnergyPreservingOrenNayar, OrenNayar, OrenNayarFull
 from fitmat.models.lobes.phong import BlinnPhong, BlinnPhongExact, Phong
-from fitmat.models.lobes.plastic import Plastic
 from fitmat.models.lobes.walter import Walter
 from fitmat.models.lobes.ward import Ward, WardBounded
 from fitmat.models.parameters import Param, as_parameter, check_range

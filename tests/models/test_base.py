@@ -252,7 +252,7 @@ def test_only_models_with_axes_change_when_both_directions_turn(hemisphere: Hemi
     wi, wo = hemisphere(60, 20), hemisphere(60, 21)
     turn = np.array([[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
     for name in map(example, LOBES):
-        with_axes = next((axes for family, axes in AXES.items() if family in name), {})
+        with_axes: dict[str, Any] = next((axes for family, axes in AXES.items() if family in name), {})
         model = fm.model(name, **with_axes)
         still = np.allclose(fm.evaluate(model, wi @ turn, wo @ turn), fm.evaluate(model, wi, wo), rtol=TURNED)
         assert model.isotropic == still, name
