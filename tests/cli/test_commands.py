@@ -226,6 +226,7 @@ def test_hopeless_data_end_in_a_labelled_result(run, tmp_path, content, results,
     assert "nan" not in ended.out.replace("value missing or NaN", "")
 
 
+@pytest.mark.study
 def test_nothing_finite_has_no_match(run, tmp_path):
     """Both default models on values beneath the floats' range: labelled, with a report, not compared."""
     path = tmp_path / "tiny.csv"
