@@ -383,7 +383,7 @@ def test_start_up_is_light(environment):
     """Neither `import fitmat` nor --help may load what takes seconds."""
     heavy = "heavy = {'jax', 'numpy', 'scipy', 'matplotlib', 'emcee', 'polars', 'xarray'} & set(sys.modules)"
     program = f"""
-import sys, fitmat, fitmat.cli
+import sys, fitmat.cli.commands
 sys.argv = ["fitmat", "fit", "--help"]
 try:
     fitmat.cli.commands.main()
