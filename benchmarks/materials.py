@@ -20,7 +20,7 @@ import numpy as np
 from tables import replace_between, to_markdown
 
 import fitmat as fm
-from fitmat.match.match import Comparison
+from fitmat.match.match import Match
 
 MODELS = ("lambert+blinn-phong", "lambert+ggx")
 
@@ -49,7 +49,7 @@ def reconstructions() -> ModuleType:
     return module
 
 
-def matched(materials: ModuleType, name: str, noise: float) -> Comparison:
+def matched(materials: ModuleType, name: str, noise: float) -> Match:
     """Measure, fit both models, and compare."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"{name}.csv"
@@ -63,7 +63,7 @@ def kind_of(name: str) -> str:
     return next(kind for kind, parts in KINDS.items() if any(part in name for part in parts))
 
 
-def row(match: Comparison) -> dict[str, float]:
+def row(match: Match) -> dict[str, float]:
     """The numbers of one line of the table."""
     seen = match.perceived
     assert seen is not None

@@ -14,7 +14,7 @@ from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.result import Fit
 from fitmat.judgement.multiplicity import adjusted_for_many
 from fitmat.judgement.prediction import as_numpy, predictions
-from fitmat.judgement.predictive_statistics import Look, Statistic
+from fitmat.judgement.predictive_statistics import Replicates, Statistic
 from fitmat.measurements.incidences import incidences
 from fitmat.text import html_table, text_table
 from fitmat.uncertainty.posterior import Posterior
@@ -123,7 +123,7 @@ def check_predictions(posterior: Posterior, *, seed: int) -> PredictiveCheck:
     for group, value in zip(groups, highest, strict=True):
         top[group.rows] = value
     draws, s = posterior.thinned(int(np.clip(MOST_NUMBERS / used.size, FEWEST_DRAWS, DRAWS)))
-    look = Look(fit, used, groups, rng, *_seen(fit, draws, s, top))
+    look = Replicates(fit, used, groups, rng, *_seen(fit, draws, s, top))
     found = [*look.whole(), *look.peaks(highest, s), *look.patterns(), *look.sides()]
     adjusted = adjusted_for_many(np.array([f.p for f in found]))
     judged = (dataclasses.replace(f, adjusted=float(a)) for f, a in zip(found, adjusted, strict=True))

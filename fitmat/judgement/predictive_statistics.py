@@ -78,7 +78,7 @@ class Statistic:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Look:
+class Replicates:
     """Residuals z, ln P(y_rep ≤ highest), model x and noise of d draws, (d, n, c), and what belongs together."""
 
     fit: Fit

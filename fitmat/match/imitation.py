@@ -20,13 +20,14 @@ from fitmat.fitting.fitting import STEADY
 from fitmat.fitting.likelihood import mapped
 from fitmat.fitting.result import Fit
 from fitmat.fitting.starts import nonnegative
-from fitmat.match.distances import AZIMUTHS, METRICS, direction_weight, incidence_weight
+from fitmat.match.distances import AZIMUTHS, direction_weight, incidence_weight
 from fitmat.match.regions import incidence_panels
 from fitmat.maths.least_squares import least_squares
 from fitmat.maths.quadrature import Rule, lobe_rule
 from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.conversion import exponent_from_alpha
+from fitmat.models.metrics import METRICS
 from fitmat.models.parameters import check_range, entries, vector, with_vector
 from fitmat.models.registry import model
 

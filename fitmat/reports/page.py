@@ -22,11 +22,11 @@ from fitmat.match.ablation import EXPLAINS, TERMS
 from fitmat.match.appearance.colour import WHITE_LUMINANCE
 from fitmat.match.appearance.spheres import CLEARLY_VISIBLE, JUST_NOTICEABLE
 from fitmat.match.discernibility import SEPARATED
-from fitmat.match.distances import METRICS
 from fitmat.match.match import Match
 from fitmat.match.regions import GRAZING_DEG, REGIONS
 from fitmat.match.sentences import CLOSE, SIMILAR
 from fitmat.measurements.samples import Measurements
+from fitmat.models.metrics import METRICS
 from fitmat.reports import plot
 from fitmat.reports.rows import parameter_rows, prior_rows
 from fitmat.studies import record
