@@ -12,32 +12,25 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fitmat.judgement.choice import SMALL, Choice
-from fitmat.judgement.design.design import Design
 from fitmat.match.ablation import Ablation
 from fitmat.match.appearance.spheres import Perceived
 from fitmat.match.discernibility import SEPARATED, Telling
 from fitmat.match.match import Match
 from fitmat.match.regions import REGIONS
 from fitmat.maths.directions import signed_zenith
+from fitmat.reports.axes import BLACK, BLUE, FIT_COLOURS, GREEN, ORANGE, PURPLE
+from fitmat.reports.axes import new_axes as new_axes
+from fitmat.reports.design_plot import design as design
 from fitmat.reports.examination_plots import examination as examination
 from fitmat.studies.findings import Findings
 from fitmat.studies.study import Study
 from fitmat.uncertainty.posterior import Posterior
-
-# Okabe & Ito's palette, safe for colour-blind readers.
-BLACK, ORANGE, BLUE, GREEN, PURPLE = "#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7"
-FIT_COLOURS = (ORANGE, BLUE, GREEN, PURPLE)
 
 MOST_DRAWN = 10.0
 """ΔE2000 from which on the map of a sphere is equally bright."""
 
 DECADES = 1.5
 """A curve that spans more decades than this is drawn on a logarithmic axis."""
-
-
-def new_axes(width: float = 5.0, height: float = 3.6) -> Axes:
-    """An empty figure's only axes, without pyplot's global state."""
-    return Figure(figsize=(width, height), layout="constrained").add_subplot()
 
 
 def curves(study: Study, *, channel: int = 0) -> Figure:
@@ -274,45 +267,3 @@ def corner(posterior: Posterior) -> Figure:
     if not several:  # corner cannot mark the best fit of a single parameter
         figure.axes[0].axvline(fit.values[columns[0]], color=ORANGE)
     return figure
-
-
-def design(design: Design, ax: Axes | None = None) -> Axes:
-    """Expected gain of a first measurement over the plane of incidence, the file's samples, and the proposals in order.
-
-    Args:
-        design: From `next_angles`; of curves the gain is drawn over the incidence.
-        ax: Where to draw; a new figure if None.
-    """
-    ax = ax or new_axes(5.6, 4.4)
-    c, flat = design.candidates, np.abs(design.candidates.phi - np.pi) < 1e-6
-    flat &= c.phi_i == c.phi_i[0]
-    what = "models apart / sd" if design.rival else "sd shrinks by a factor"
-    if design.kind == "curve":
-        ax.plot(np.rad2deg(c.theta_i[flat]), design.gains[flat], ".-", color=BLUE, label="in the plane of incidence")
-        across = ~flat & (c.phi_i == c.phi_i[0])
-        ax.plot(np.rad2deg(c.theta_i[across]), design.gains[across], ".--", color=GREEN, label="across it")
-        for k, p in enumerate(design.proposals):
-            ax.axvline(np.rad2deg(p.theta_i), color=ORANGE, lw=0.8, ls=":")
-            ax.annotate(str(k + 1), (np.rad2deg(p.theta_i), 1.0 - 0.06 * (k + 1)), xycoords=("data", "axes fraction"))
-        ax.set(xlabel="incidence θᵢ / °", ylabel=what, xlim=(0, 90))
-        ax.legend(fontsize=8)
-        return ax
-    x, y = np.rad2deg(c.theta_o[flat, 0]), np.rad2deg(c.theta_i[flat])
-    drawn = ax.tricontourf(x, y, np.log10(np.maximum(design.gains[flat], 1e-3)), levels=16, cmap="cividis")
-    bar = ax.figure.colorbar(drawn, ax=ax, format=lambda v, _: f"{10**v:.3g}")
-    bar.set_label(what)
-    m = design.fit.measurements
-    rows = m.in_plane & m.valid.any(axis=1)
-    signed, light = np.rad2deg(m.signed_theta_o[rows]), np.rad2deg(m.theta_i[rows])
-    ax.plot(signed, light, ".", color="white", ms=2.5, mec=BLACK, mew=0.2, label="measured")
-    for k, p in enumerate(design.proposals):
-        inside = abs(p.phi - np.pi) < 1e-6
-        at = float(np.rad2deg(p.theta_o[0])), float(np.rad2deg(p.theta_i))
-        ax.plot(*at, "o" if inside else "s", color=ORANGE, ms=9, mec="white")
-        beside = "" if inside else f" φ {np.rad2deg(p.phi):.0f}°"
-        ax.annotate(f"{k + 1}{beside}", at, ha="center", va="center", fontsize=7, color="white")
-    ax.set(xlim=(-90, 90), ylim=(-2, 90), xticks=[-60, -30, 0, 30, 60])
-    ax.set_xlabel("θₒ / °  (positive = mirror side)")
-    ax.set_ylabel("incidence θᵢ / °")
-    ax.legend(fontsize=8, loc="lower left")
-    return ax

@@ -194,6 +194,7 @@ def test_a_parameter_on_its_bound_stays_there_and_what_is_held_stays(coloured: C
     assert held.discrepancy == pytest.approx(at_bound.discrepancy, rel=SAME)
 
 
+@pytest.mark.study
 def test_too_few_passes_are_named(coloured: Chunks, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(streamed, "PASSES", 1)
     assert not streamed._climb(*_climber(coloured)).settled

@@ -1,0 +1,16 @@
+"""Axes: the palette and the empty figures that all pictures begin with.
+
+Nothing is drawn here.
+"""
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+# Okabe & Ito's palette, safe for colour-blind readers.
+BLACK, ORANGE, BLUE, GREEN, PURPLE = "#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7"
+FIT_COLOURS = (ORANGE, BLUE, GREEN, PURPLE)
+
+
+def new_axes(width: float = 5.0, height: float = 3.6) -> Axes:
+    """An empty figure's only axes, without pyplot's global state."""
+    return Figure(figsize=(width, height), layout="constrained").add_subplot()
