@@ -13,10 +13,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from fitmat.judgement.calibration import (
-    DRAWS,
     FAMILY,
     LEVELS,
     LOG_LIKELIHOOD,
+    RANKED_DRAWS,
     Calibration,
     coverage_limits,
     join,
@@ -103,7 +103,7 @@ def write(found: Mapping[Any, Calibration], out: Path, priors: Mapping[str, Any]
     wrong, wrong_cells = _rejected(pooled), _rejected(by_cell)
     page = PAGE.format(
         total=sum(len(result.trusted) for result in right.values()),
-        draws=DRAWS,
+        draws=RANKED_DRAWS,
         priors="\n".join(f"- {name}: {_prior(given)}" for name, given in priors.items()),
         left_out=_left_out(pooled),
         noises=", ".join(f"{floor:g} sr⁻¹ and {name}" for name, (_, floor) in noises.items()),
@@ -225,8 +225,8 @@ def _pictures(rows: Mapping[str, Calibration], out: Path) -> None:
 
 def ranks_figure(ax: Axes, ranks: np.ndarray) -> Axes:
     """Cumulative ranks minus the diagonal, with their simultaneous band; orange where they leave it."""
-    z, limits = band(len(ranks), DRAWS, BAND)
-    below = np.searchsorted(np.sort(ranks), np.arange(1, DRAWS + 1)) / len(ranks)
+    z, limits = band(len(ranks), RANKED_DRAWS, BAND)
+    below = np.searchsorted(np.sort(ranks), np.arange(1, RANKED_DRAWS + 1)) / len(ranks)
     outside = bool(((below < limits[0] - 1e-12) | (below > limits[1] + 1e-12)).any())
     ax.fill_between(z, limits[0] - z, limits[1] - z, color=SHADE, linewidth=0)
     ax.plot(z, below - z, color=BAD if outside else LINE, linewidth=1.2)
@@ -237,8 +237,8 @@ def ranks_figure(ax: Axes, ranks: np.ndarray) -> Axes:
 
 def coverage_figure(ax: Axes, result: Calibration) -> Axes:
     """Coverage minus level of every central interval of ranks; one line for each quantity, with pointwise limits."""
-    levels = np.arange(1, DRAWS // 2 + 1) * 2.0 / (DRAWS + 1)
-    off = np.abs(2.0 * result.ranks[result.trusted] - DRAWS) / (DRAWS + 1)
+    levels = np.arange(1, RANKED_DRAWS // 2 + 1) * 2.0 / (RANKED_DRAWS + 1)
+    off = np.abs(2.0 * result.ranks[result.trusted] - RANKED_DRAWS) / (RANKED_DRAWS + 1)
     count = len(off)
     error = 1.96 * np.sqrt(levels * (1 - levels) / count)
     ax.fill_between(100 * levels, -100 * error, 100 * error, color=SHADE, linewidth=0)

@@ -1,6 +1,6 @@
 """Options of `fitmat simulate` as text, and the files it writes; nothing is replaced unless asked.
 
-The physics and the noise are `synthetic`'s.
+The physics and the noise are those of `models.simulation`.
 """
 
 from collections.abc import Sequence

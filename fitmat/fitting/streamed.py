@@ -240,6 +240,6 @@ def _concluded(file: _File, around: _Range, top: _Top) -> Fit:
 
 
 def _discrepancy_sd(sums: Sums) -> float:
-    """Half of how far s must rise for the log-likelihood to fall by 2, as `approximation` has it, from its parabola."""
+    """Half of how far s must rise for the log-likelihood to fall by 2, as `laplace` has it, from its parabola."""
     slope, curvature = max(float(sums.slope), 0.0), max(float(sums.curvature), 1e-300)
     return float((np.sqrt(slope**2 + 4.0 * curvature) - slope) / (2.0 * curvature))

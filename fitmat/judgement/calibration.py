@@ -35,7 +35,7 @@ from fitmat.uncertainty.chains import sample
 from fitmat.uncertainty.laplace import laplace
 from fitmat.uncertainty.posterior import Posterior
 
-DRAWS = 99
+RANKED_DRAWS = 99
 """L, draws among which the truth is ranked: far fewer than a posterior's effective ones, so hardly dependent."""
 
 LEVELS = (0.5, 0.68, 0.95)
@@ -58,7 +58,7 @@ class Calibration:
         model: The model's name.
         method: "laplace" or "emcee".
         quantities: Names of the free parameters, `DISCREPANCY` and `LOG_LIKELIHOOD`, (q,).
-        ranks: How many of `DRAWS` posterior draws lie below the truth, (n, q).
+        ranks: How many of `RANKED_DRAWS` posterior draws lie below the truth, (n, q).
         covered: Whether the central interval of each of `LEVELS` holds the truth, (n, levels, q − 1); a log-likelihood
             has none.
         trusted: Whether the posterior itself says that its draws follow the density, (n,). It says so from the data
@@ -78,7 +78,7 @@ class Calibration:
 
     def p_values(self) -> Float[np.ndarray, " q"]:
         """Of the uniformity of the ranks of each quantity (`uniformity.p_values`)."""
-        return p_values(self.ranks[self.trusted], DRAWS)
+        return p_values(self.ranks[self.trusted], RANKED_DRAWS)
 
     def faults(self, family: float = FAMILY) -> tuple[str, ...]:
         """Quantities whose ranks are not uniform, a right program having any with probability `family` at most."""
@@ -192,7 +192,7 @@ def _quantities(template: AbstractBRDF) -> tuple[str, ...]:
 def _placed(posterior: Posterior, truth: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray, np.bool_]:
     """Ranks (q,), coverage (levels, q − 1) and trust of one posterior."""
     every = np.column_stack([posterior.values, posterior.discrepancy])
-    few, true = np.column_stack(posterior.thinned(DRAWS)), np.append(truth, s)
+    few, true = np.column_stack(posterior.thinned(RANKED_DRAWS)), np.append(truth, s)
     likelihood = _log_likelihoods(posterior.fit, np.vstack([true, few]))
     below = np.append((few < true).sum(axis=0), (likelihood[1:] < likelihood[0]).sum())
     ends = [np.quantile(every, [(1 - level) / 2, (1 + level) / 2], axis=0) for level in LEVELS]

@@ -12,7 +12,7 @@ from fitmat.fitting.likelihood import log_pointwise
 from fitmat.judgement.prediction import as_numpy, predictions
 from fitmat.uncertainty.posterior import GOOD_PARETO, Posterior
 
-DRAWS = 1000
+LEFT_OUT_DRAWS = 1000
 """Posterior draws behind the predictive densities."""
 
 MOST_LEFT_OUT = 20_000
@@ -46,7 +46,7 @@ def weigh(posterior: Posterior) -> Evidence | None:
     used = np.asarray(fit.data.weight) > 0
     if int(used.sum()) > MOST_LEFT_OUT or fit.n_values > MOST_LEFT_OUT:
         return None
-    draws, s = posterior.thinned(DRAWS)
+    draws, s = posterior.thinned(LEFT_OUT_DRAWS)
     data, logs = as_numpy(fit.data), np.empty((len(s), int(used.sum())))
     for part, x, noise, spread in predictions(fit, draws, s):
         logs[part] = log_pointwise(x, noise, data, spread)[:, used]

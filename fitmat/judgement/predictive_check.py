@@ -19,7 +19,7 @@ from fitmat.measurements.incidences import incidences
 from fitmat.text import html_table, text_table
 from fitmat.uncertainty.posterior import Posterior
 
-DRAWS = 200
+REPLICATED_DRAWS = 200
 """Posterior draws behind every p-value, where the file is not large."""
 
 MOST_NUMBERS = 4_000_000
@@ -122,7 +122,7 @@ def check_predictions(posterior: Posterior, *, seed: int) -> PredictiveCheck:
     highest, top = np.array([y[g.rows].max() for g in groups]), np.zeros(len(y))
     for group, value in zip(groups, highest, strict=True):
         top[group.rows] = value
-    draws, s = posterior.thinned(int(np.clip(MOST_NUMBERS / used.size, FEWEST_DRAWS, DRAWS)))
+    draws, s = posterior.thinned(int(np.clip(MOST_NUMBERS / used.size, FEWEST_DRAWS, REPLICATED_DRAWS)))
     look = Replicates(fit, used, groups, rng, *_seen(fit, draws, s, top))
     found = [*look.whole(), *look.peaks(highest, s), *look.patterns(), *look.sides()]
     adjusted = adjusted_for_many(np.array([f.p for f in found]))

@@ -29,7 +29,7 @@ from fitmat.uncertainty.posterior import Posterior
 if TYPE_CHECKING:
     from fitmat.match.appearance.spheres import Perceived
 
-DRAWS = 100
+MATCH_DRAWS = 100
 """Posterior draws behind every interval of the match."""
 
 FEW_DRAWS = 50
@@ -105,7 +105,7 @@ class Match:
 
     @property
     def verdict(self) -> str:
-        """The match in plain sentences; the thresholds are those of `headline`, `telling`, `ablation` and `sphere`."""
+        """The match in plain sentences; thresholds are those of `sentences`, `discernibility`, `ablation`, `spheres`."""
         names = _lobe_title(self.empirical.fit.name), _lobe_title(self.microfacet.fit.name)
         found = [
             sentences.distance_sentence(names, self.hemisphere_distance),
@@ -252,7 +252,7 @@ def _paired(empirical: Posterior, microfacet: Posterior) -> PairedDraws:
 
 def _by_scale(posterior: Posterior) -> np.ndarray:
     """Draws in the order of the shared scale, which has one true value for both models; else as they come."""
-    values = posterior.thinned(DRAWS)[0]
+    values = posterior.thinned(MATCH_DRAWS)[0]
     place = next((e.place for e in posterior.fit.entries if e.name == "scale"), None)
     return values if place is None else values[np.argsort(values[:, place.start])]
 

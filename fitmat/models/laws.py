@@ -26,7 +26,7 @@ LAWS = {
 }
 """Law → what it says. Most single-scattering models break the last; the others are declared where broken."""
 
-DRAWS = 8
+PARAMETER_SETS = 8
 """Sets of parameters that are tried, beside the defaults."""
 
 PAIRS = 400
@@ -103,13 +103,13 @@ def _range(entry: Entry) -> tuple[float, float]:
 
 
 def _drawn(template: AbstractBRDF, rng: np.random.Generator) -> Float[np.ndarray, "d p"]:
-    """Parameter vectors with all weights 1: the defaults, all at the lower or upper end, then `DRAWS` at random."""
+    """Parameter vectors, weights 1: the defaults, all at the lower or upper end, then `PARAMETER_SETS` at random."""
     first = np.array(vector(template))
-    rows = np.tile(first, (DRAWS + 3, 1))
+    rows = np.tile(first, (PARAMETER_SETS + 3, 1))
     for entry in entries(template):
         lower, upper = _range(entry)
         part = np.concatenate(
-            [np.zeros((1, entry.size)), np.ones((1, entry.size)), rng.uniform(size=(DRAWS, entry.size))]
+            [np.zeros((1, entry.size)), np.ones((1, entry.size)), rng.uniform(size=(PARAMETER_SETS, entry.size))]
         )
         if entry.param.weight:
             rows[:, entry.place] = min(1.0, entry.param.upper)

@@ -1,6 +1,6 @@
 """Laplace's approximation: the Gaussian around the best fit, corrected by the density itself, and draws from it.
 
-It walks nowhere; `uncertainty` does. A correction that cannot be relied on is not made, and the verdict says so.
+It walks nowhere; `chains` does. A correction that cannot be relied on is not made, and the verdict says so.
 """
 
 import dataclasses

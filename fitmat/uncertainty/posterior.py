@@ -1,6 +1,6 @@
 """Draws of a fit's parameters, how the sampler went, and whether the draws may be trusted.
 
-Draws nothing itself; `uncertainty` does.
+Draws nothing itself; `chains` and `laplace` do.
 """
 
 import dataclasses

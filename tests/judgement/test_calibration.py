@@ -11,7 +11,7 @@ from scipy import stats
 import fitmat as fm
 from fitmat.errors import FitmatError, ModelError
 from fitmat.judgement import calibration
-from fitmat.judgement.calibration import DRAWS, Calibration, calibrate, coverage_limits, join
+from fitmat.judgement.calibration import RANKED_DRAWS, Calibration, calibrate, coverage_limits, join
 from fitmat.judgement.multiplicity import adjusted_for_many
 from fitmat.judgement.uniformity import SETS, band, p_values
 
@@ -61,12 +61,12 @@ def test_the_band_is_that_of_arviz() -> None:
 
 def test_uniform_ranks_leave_their_band_as_often_as_it_says() -> None:
     """Of 2,000 sets of uniform ranks 5 % ± 1.5 %, three standard errors."""
-    ranks = np.random.default_rng(5).integers(0, DRAWS + 1, size=(200, 2000))
-    z, limits = band(200, DRAWS, 0.95)
+    ranks = np.random.default_rng(5).integers(0, RANKED_DRAWS + 1, size=(200, 2000))
+    z, limits = band(200, RANKED_DRAWS, 0.95)
     below = np.array([np.mean(ranks < (k + 1), axis=0) for k in range(len(z))])
     outside = ((below < limits[0][:, None] - 1e-12) | (below > limits[1][:, None] + 1e-12)).any(axis=0)
     assert outside.mean() == pytest.approx(0.05, abs=0.015)
-    assert np.mean(p_values(ranks, DRAWS) <= 0.05) == pytest.approx(0.05, abs=0.015)
+    assert np.mean(p_values(ranks, RANKED_DRAWS) <= 0.05) == pytest.approx(0.05, abs=0.015)
 
 
 def test_holm_by_hand() -> None:
@@ -108,7 +108,7 @@ def test_too_little_noise_told_is_found_as_too_much_discrepancy() -> None:
     wrong = lambert(0.5)
     assert "discrepancy" in wrong.faults()
     assert wrong.p_values().min() < CLEARLY
-    assert np.median(wrong.ranks[wrong.trusted, 1]) < DRAWS / 4
+    assert np.median(wrong.ranks[wrong.trusted, 1]) < RANKED_DRAWS / 4
     assert wrong.words.startswith("lambert, laplace: NOT calibrated: the posterior is wrong in ")
 
 
@@ -126,7 +126,7 @@ def test_chains_are_ranked_as_well() -> None:
     few = lambert(simulations=2, method="emcee", progress=lambda what, done, of: seen.append((done, of)))
     assert few.method == "emcee"
     assert few.trusted.all()
-    assert ((few.ranks >= 0) & (few.ranks <= DRAWS)).all()
+    assert ((few.ranks >= 0) & (few.ranks <= RANKED_DRAWS)).all()
     assert seen == [(1, 2), (2, 2)]
 
 

@@ -1,6 +1,6 @@
 """Profile likelihoods: how well the data are fitted where one parameter is held and all others follow.
 
-Judges nothing: what a flat profile means, `identifiability` says. The discrepancy s is held at its best value.
+Judges nothing: what a flat profile means, `verdicts` says. The discrepancy s is held at its best value.
 """
 
 import dataclasses

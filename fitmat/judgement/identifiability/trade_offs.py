@@ -1,6 +1,6 @@
 """Trade-offs: which parameters act alike in a fit, and which combination of them is determined all the same.
 
-It sees information and draws only; whether a parameter is determined, `identifiability` says.
+It sees information and draws only; whether a parameter is determined, `verdicts` says.
 """
 
 import dataclasses

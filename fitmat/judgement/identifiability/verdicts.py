@@ -17,7 +17,7 @@ from fitmat.judgement.identifiability.trade_offs import Group, groups
 from fitmat.text import html_table, interval, text_table, with_error
 from fitmat.uncertainty.posterior import Posterior
 
-DRAWS = 4000
+CONTRACTION_DRAWS = 4000
 """Draws behind contractions and intervals."""
 
 CONTRACTED = 0.5
@@ -165,7 +165,7 @@ def identify(posterior: Posterior) -> Identifiability:
 
 def _draws(posterior: Posterior, along: Ridge) -> np.ndarray:
     sampled = posterior.method != "laplace" and posterior.usable
-    return posterior.thinned(DRAWS)[0] if sampled else along.draws(DRAWS, seed=0)
+    return posterior.thinned(CONTRACTION_DRAWS)[0] if sampled else along.draws(CONTRACTION_DRAWS, seed=0)
 
 
 def _verdict(fit: Fit, profile: Profile, contraction: float, prior: float) -> Verdict:

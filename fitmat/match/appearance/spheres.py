@@ -22,7 +22,7 @@ from fitmat.models.base import AbstractBRDF
 from fitmat.models.values import Draws, blocks, surfaces, values, widths
 from fitmat.uncertainty.estimate import Estimate, estimate
 
-DRAWS = 40
+SPHERE_DRAWS = 40
 """Pairs of posterior draws behind every interval."""
 
 MIDDLE_GREY = 0.18
@@ -127,7 +127,7 @@ def perceived(
         empirical: The fitted model; only its surface counts, not the instrument.
         microfacet: The reference.
         draws: Parameter vectors of both, paired, rows: the best fits, then posterior draws, (d, p) and (d, q); at
-            most `DRAWS` of these are used, evenly spread.
+            most `SPHERE_DRAWS` of these are used, evenly spread.
         channels: Names of the channels.
 
     Example:
@@ -139,7 +139,7 @@ def perceived(
         'one channel, drawn grey'
     """
     colours, count = colouring(channels), len(draws[0])
-    used = np.unique(np.r_[0, np.linspace(min(1, count - 1), count - 1, min(DRAWS, count)).round().astype(int)])
+    used = np.unique(np.r_[0, np.linspace(min(1, count - 1), count - 1, min(SPHERE_DRAWS, count)).round().astype(int)])
     pair = surfaces(empirical, draws[0][used]), surfaces(microfacet, draws[1][used])
     screens, computed = _rendered(pair, colours.weights)
     names = [*scene.LIGHTS, scene.ENVIRONMENT]

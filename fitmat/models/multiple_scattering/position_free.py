@@ -1,4 +1,4 @@
-"""Multiple scattering on Smith microsurfaces without depths: the mean of `walk` with less variance.
+"""Multiple scattering on Smith microsurfaces without depths: the mean of `random_walk` with less variance.
 
 Reflection only: light that a facet refracts leaves the half space in which all depths integrate to exponentials.
 
