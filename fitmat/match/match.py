@@ -105,7 +105,7 @@ class Match:
 
     @property
     def verdict(self) -> str:
-        """The match in plain sentences; thresholds are those of `sentences`, `discernibility`, `ablation`, `spheres`."""
+        """The match in plain sentences; thresholds: `sentences`, `discernibility`, `ablation`, `spheres`."""
         names = _lobe_title(self.empirical.fit.name), _lobe_title(self.microfacet.fit.name)
         found = [
             sentences.distance_sentence(names, self.hemisphere_distance),
