@@ -1,6 +1,6 @@
 """`python -m fitmat`."""
 
-from fitmat.cli.commands import main
+from fitmat.cli.main import main
 
 if __name__ == "__main__":
     main()

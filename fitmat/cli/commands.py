@@ -1,8 +1,5 @@
 """The command line: parse, one library call, print. The only room that speaks."""
 
-import atexit
-import gc
-import os
 import sys
 import warnings
 from pathlib import Path
@@ -10,11 +7,49 @@ from typing import Any
 
 import typer
 
-from fitmat.cli import flags, options, process
-from fitmat.errors import FitmatError
+from fitmat.cli import process
+from fitmat.cli.flags.design import CountFlag, ForFlag, KindFlag
+from fitmat.cli.flags.files import (
+    ConvertedFlag,
+    DesignPlotFlag,
+    FileFlag,
+    ForceFlag,
+    JsonFlag,
+    OutFlag,
+    PlotFlag,
+    ReplaceFlag,
+)
+from fitmat.cli.flags.fitting import (
+    CheckPosteriorFlag,
+    FixFlag,
+    IorFlag,
+    LossFlag,
+    MaskingFlag,
+    ModelsFlag,
+    NoMcmcFlag,
+    PriorFlag,
+    SeedFlag,
+    TiltFlag,
+)
+from fitmat.cli.flags.groups import takes
+from fitmat.cli.flags.instrument import instrument
+from fitmat.cli.flags.models import CheckFlag, NameFlag
+from fitmat.cli.flags.reading import reading
+from fitmat.cli.flags.simulate import (
+    CatalogueFlag,
+    FloorFlag,
+    ModelFlag,
+    NoiseFlag,
+    PhiFlag,
+    PhiIFlag,
+    SetFlag,
+    SimulatedOutFlag,
+    SimulatedSeedFlag,
+    ThetaIFlag,
+    ThetaOFlag,
+)
 
 DEFAULT_MODELS = "lambert+blinn-phong,lambert+ggx"
-WRONG_INPUT = 1
 NOT_CONVERGED = 3
 
 app = typer.Typer(
@@ -32,17 +67,6 @@ app = typer.Typer(
 )
 
 
-def _setup() -> None:
-    """Turn on 64-bit floats and keep compiled programs between runs."""
-    import jax
-    import platformdirs
-
-    jax.config.update("jax_enable_x64", True)
-    cache = platformdirs.user_cache_path("fitmat") / "compiled"
-    jax.config.update("jax_compilation_cache_dir", str(cache))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
-
-
 @app.command(
     epilog="Columns of a table, by name: theta_i, theta_o and phi (or phi_i and phi_o, or a signed theta_o alone) in "
     "degrees; brdf, brdf_cos, reflectance_factor, radiance, or signal and reference; brdf_r, brdf_g, brdf_b or "
@@ -57,27 +81,27 @@ def _setup() -> None:
     "  fitmat fit scan.txt --columns theta_i=AOI,brdf=4 --no-mcmc\n\n"
     "  fitmat fit mirror.csv --receiver-angle 0.5 --calibration 0.03"
 )
-@flags.takes(flags.reading, flags.instrument)
+@takes(reading, instrument)
 def fit(
     reading: dict[str, Any],
     instrument: Any,
-    file: options.FileFlag,
-    models: options.ModelsFlag = DEFAULT_MODELS,
-    out: options.OutFlag = None,
-    force: options.ForceFlag = False,
-    json_: options.JsonFlag = False,
-    no_mcmc: options.NoMcmcFlag = False,
-    seed: options.SeedFlag = 0,
-    fix: options.FixFlag = None,
-    masking: options.MaskingFlag = None,
-    loss: options.LossFlag = "default",
-    prior: options.PriorFlag = None,
-    check_posterior: options.CheckPosteriorFlag = False,
-    ior: options.IorFlag = None,
-    tilt: options.TiltFlag = False,
+    file: FileFlag,
+    models: ModelsFlag = DEFAULT_MODELS,
+    out: OutFlag = None,
+    force: ForceFlag = False,
+    json_: JsonFlag = False,
+    no_mcmc: NoMcmcFlag = False,
+    seed: SeedFlag = 0,
+    fix: FixFlag = None,
+    masking: MaskingFlag = None,
+    loss: LossFlag = "default",
+    prior: PriorFlag = None,
+    check_posterior: CheckPosteriorFlag = False,
+    ior: IorFlag = None,
+    tilt: TiltFlag = False,
 ) -> None:
     """Fit models to a file of measurements and write a report with the Phong–microfacet match."""
-    _setup()
+    process.set_up()
     from fitmat import files
     from fitmat.cli import session
     from fitmat.fitting import priors
@@ -118,25 +142,25 @@ def fit(
     "Example:\n\n"
     "  fitmat simulate lambert+ggx --set kd=0.3 --set alpha=0.2 --out plastic.csv"
 )
-@flags.takes(flags.instrument)
+@takes(instrument)
 def simulate(
     instrument: Any,
-    model: options.ModelFlag = None,
-    out: options.SimulatedOutFlag = Path("simulated.csv"),
-    set_: options.SetFlag = None,
-    theta_i: options.ThetaIFlag = "10,30,45,60,75",
-    theta_o: options.ThetaOFlag = "-80:80:2",
-    phi: options.PhiFlag = "180",
-    phi_i: options.PhiIFlag = "0",
-    noise: options.NoiseFlag = 0.02,
-    floor: options.FloorFlag = 1e-3,
-    seed: options.SimulatedSeedFlag = 0,
-    masking: options.MaskingFlag = None,
-    catalogue: options.CatalogueFlag = None,
-    force: options.ReplaceFlag = False,
+    model: ModelFlag = None,
+    out: SimulatedOutFlag = Path("simulated.csv"),
+    set_: SetFlag = None,
+    theta_i: ThetaIFlag = "10,30,45,60,75",
+    theta_o: ThetaOFlag = "-80:80:2",
+    phi: PhiFlag = "180",
+    phi_i: PhiIFlag = "0",
+    noise: NoiseFlag = 0.02,
+    floor: FloorFlag = 1e-3,
+    seed: SimulatedSeedFlag = 0,
+    masking: MaskingFlag = None,
+    catalogue: CatalogueFlag = None,
+    force: ReplaceFlag = False,
 ) -> None:
     """Simulate measurements of a known material, to test an instrument's plan or fitmat itself."""
-    _setup()
+    process.set_up()
     from fitmat.cli import simulate
 
     if catalogue is not None:
@@ -158,17 +182,17 @@ def simulate(
 @app.command(
     epilog="Examples:\n\n  fitmat check measurements.csv --plot coverage.png\n\n  fitmat check gold.binary --json"
 )
-@flags.takes(flags.reading, flags.instrument)
+@takes(reading, instrument)
 def check(
     reading: dict[str, Any],
     instrument: Any,
-    file: options.FileFlag,
-    plot: options.PlotFlag = None,
-    force: options.ReplaceFlag = False,
-    json_: options.JsonFlag = False,
+    file: FileFlag,
+    plot: PlotFlag = None,
+    force: ReplaceFlag = False,
+    json_: JsonFlag = False,
 ) -> None:
     """Describe a file before any fit: what was measured where, how consistently, and what can be learnt from it."""
-    _setup()
+    process.set_up()
     from fitmat.cli import check
     from fitmat.measurements.reader import read
 
@@ -183,12 +207,12 @@ def check(
     "  fitmat convert gold.binary gold.parquet\n\n"
     "  fitmat convert scan.txt scan.bsdf --columns theta_i=AOI,brdf=4"
 )
-@flags.takes(flags.reading)
+@takes(reading)
 def convert(
     reading: dict[str, Any],
-    file: options.FileFlag,
-    out: options.ConvertedFlag,
-    force: options.ReplaceFlag = False,
+    file: FileFlag,
+    out: ConvertedFlag,
+    force: ReplaceFlag = False,
 ) -> None:
     """Write measurements in another format; what that cannot hold is said."""
     from fitmat.measurements import writing
@@ -203,16 +227,16 @@ def convert(
 
 @app.command()
 def models(
-    name: options.NameFlag = None,
-    check: options.CheckFlag = False,
+    name: NameFlag = None,
+    check: CheckFlag = False,
 ) -> None:
     """List the models, or print the manual page of one: formula, parameters, limits, reference, laws."""
     from fitmat.cli import manual
 
     if check:
-        _setup()
+        process.set_up()
         if surprises := manual.check():
-            _end(f"{', '.join(surprises)} break a law that their manual pages do not mention.")
+            process.end(f"{', '.join(surprises)} break a law that their manual pages do not mention.")
     elif name is None:
         manual.list_models()
     else:
@@ -223,23 +247,23 @@ def models(
     epilog="Examples:\n\n  fitmat design measurements.csv --for eta\n\n"
     "  fitmat design measurements.csv --for match --kind curve --plot next.png"
 )
-@flags.takes(flags.reading, flags.instrument)
+@takes(reading, instrument)
 def design(
     reading: dict[str, Any],
     instrument: Any,
-    file: options.FileFlag,
-    models: options.ModelsFlag = DEFAULT_MODELS,
-    for_: options.ForFlag = None,
-    kind: options.KindFlag = "sample",
-    count: options.CountFlag = 5,
-    plot: options.DesignPlotFlag = None,
-    force: options.ReplaceFlag = False,
-    json_: options.JsonFlag = False,
-    seed: options.SeedFlag = 0,
-    fix: options.FixFlag = None,
+    file: FileFlag,
+    models: ModelsFlag = DEFAULT_MODELS,
+    for_: ForFlag = None,
+    kind: KindFlag = "sample",
+    count: CountFlag = 5,
+    plot: DesignPlotFlag = None,
+    force: ReplaceFlag = False,
+    json_: JsonFlag = False,
+    seed: SeedFlag = 0,
+    fix: FixFlag = None,
 ) -> None:
     """Say which angles to measure next, and by how much they would narrow what is not yet known."""
-    _setup()
+    process.set_up()
     from fitmat.cli import design, session
     from fitmat.measurements.reader import read
     from fitmat.models.parameters import assignments
@@ -260,29 +284,3 @@ def losses() -> None:
     from fitmat.cli import manual
 
     manual.list_losses()
-
-
-def main() -> None:
-    """Run the command line; wrong input, a full disk and Ctrl-C become one line on stderr and an exit code."""
-    process.prepare_streams()
-    process.leave_on_interrupt()
-    # A run is short and makes few reference cycles; looking for them, at the end above all, takes a fifth of its time.
-    gc.disable()
-    atexit.register(gc.freeze)
-    try:
-        try:
-            app()
-        finally:
-            gc.enable()
-            sys.stdout.flush()
-    except FitmatError as error:
-        _end(str(error))
-    except OSError as error:
-        # What could not be written must not be tried again when Python closes stdout.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        _end(f"cannot write the output: {error.strerror or error}.")
-
-
-def _end(message: str) -> None:
-    sys.stderr.write(f"fitmat: {message}\n")
-    sys.exit(WRONG_INPUT)

@@ -13,8 +13,8 @@ import warnings
 from pathlib import Path
 from types import FrameType
 
-INTERRUPTED = 130
-"""Exit code after Ctrl-C."""
+WRONG_INPUT, INTERRUPTED = 1, 130
+"""Exit codes after wrong input, and after Ctrl-C."""
 
 
 def prepare_streams() -> None:
@@ -41,3 +41,20 @@ def leave_on_interrupt(draft: Path | None = None) -> None:
         os._exit(INTERRUPTED)
 
     signal.signal(signal.SIGINT, leave)
+
+
+def set_up() -> None:
+    """Turn on 64-bit floats and keep compiled programs between runs."""
+    import jax
+    import platformdirs
+
+    jax.config.update("jax_enable_x64", True)
+    cache = platformdirs.user_cache_path("fitmat") / "compiled"
+    jax.config.update("jax_compilation_cache_dir", str(cache))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+
+
+def end(message: str) -> None:
+    """Say in one line what is wrong, and leave."""
+    sys.stderr.write(f"fitmat: {message}\n")
+    sys.exit(WRONG_INPUT)

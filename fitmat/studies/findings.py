@@ -12,8 +12,8 @@ from jaxtyping import Float
 from fitmat.fitting import priors
 from fitmat.fitting.result import Fit
 from fitmat.judgement.doubts import Doubts, find_doubts
+from fitmat.judgement.fit_metrics import fit_metrics
 from fitmat.judgement.identifiability.verdicts import Identifiability
-from fitmat.judgement.metrics import fit_metrics
 from fitmat.judgement.prediction import Section, standardised_residuals
 from fitmat.judgement.predictive_check import PredictiveCheck
 from fitmat.studies.curves import Curve, predict_curves

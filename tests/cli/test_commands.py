@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from fitmat._types import Progress
-from fitmat.cli import commands
+from fitmat.cli.main import main
 from fitmat.studies import study as room
 from fitmat.uncertainty.chains import CHUNK
 
@@ -46,7 +46,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
     def call(*arguments: object) -> Ended:
         monkeypatch.setattr(sys, "argv", ["fitmat", *map(str, arguments)])
         with pytest.raises(SystemExit) as end:
-            commands.main()
+            main()
         written = capsys.readouterr()
         return Ended(int(end.value.code or 0), written.out, written.err)
 
@@ -383,10 +383,10 @@ def test_start_up_is_light(environment):
     """Neither `import fitmat` nor --help may load what takes seconds."""
     heavy = "heavy = {'jax', 'numpy', 'scipy', 'matplotlib', 'emcee', 'polars', 'xarray'} & set(sys.modules)"
     program = f"""
-import sys, fitmat.cli.commands
+import sys, fitmat.cli.main
 sys.argv = ["fitmat", "fit", "--help"]
 try:
-    fitmat.cli.commands.main()
+    fitmat.cli.main.main()
 except SystemExit:
     {heavy}
     sys.exit(", ".join(heavy) or 0)

@@ -16,7 +16,7 @@ import fitmat as fm
 from fitmat.errors import FitmatError, ModelError
 from fitmat.fitting.likelihood import Data, log_likelihood, prepare
 from fitmat.fitting.losses import BAD_SHARE, BAD_SPREAD, LOSSES, T_DOF, bad_probability, loss
-from fitmat.judgement.metrics import fit_metrics
+from fitmat.judgement.fit_metrics import fit_metrics
 from fitmat.measurements.noise import measured_noise
 from fitmat.models.around.noise import Noisy
 from fitmat.models.base import AbstractBRDF, evaluate

@@ -12,7 +12,7 @@ from oracles import ggx
 import fitmat as fm
 from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
-from fitmat.judgement.metrics import fit_metrics
+from fitmat.judgement.fit_metrics import fit_metrics
 from fitmat.match import sentences
 from fitmat.match.ablation import EXPLAINS, TERMS, Ablation
 from fitmat.match.appearance import spheres

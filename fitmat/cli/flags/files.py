@@ -1,0 +1,48 @@
+"""Flags that name files: what is read, and what is written where.
+
+They set no default and check nothing but their type.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+FileFlag = Annotated[
+    Path,
+    typer.Argument(
+        help="Measurements: CSV or any text table, Parquet, MERL, RGL, Zemax, LightTools, FRED, ASTM, UTIA, ALTA, SSDD."
+    ),
+]
+
+OutFlag = Annotated[
+    Path | None,
+    typer.Option(
+        help="Folder for the report; default NAME-fitmat (then -2, -3, …) beside the input.",
+        metavar="DIR",
+        show_default=False,
+    ),
+]
+
+ForceFlag = Annotated[bool, typer.Option("--force", help="Replace the report of an earlier run in --out.")]
+
+JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
+
+PlotFlag = Annotated[
+    Path | None,
+    typer.Option(help="Draw what was measured where into this PNG, SVG or PDF.", metavar="FILE", show_default=False),
+]
+
+DesignPlotFlag = Annotated[
+    Path | None,
+    typer.Option(
+        help="Draw what each next angle is worth into this PNG, SVG or PDF.", metavar="FILE", show_default=False
+    ),
+]
+
+ConvertedFlag = Annotated[
+    Path,
+    typer.Argument(help="File to write: .csv, .parquet, .binary (MERL), .bsdf (Zemax) or .alta.", show_default=False),
+]
+
+ReplaceFlag = Annotated[bool, typer.Option("--force", help="Replace the file where it exists.")]

@@ -1,0 +1,80 @@
+"""Flags of a fit: models, what is known of them, the loss, the sampling.
+
+They set no default and check nothing but their type.
+"""
+
+from typing import Annotated
+
+import typer
+
+ModelsFlag = Annotated[
+    str,
+    typer.Option(
+        help="Models to fit, separated by commas, or 'all'; see [bold]fitmat models[/bold]. An empirical and a "
+        "microfacet model are compared. Default: lambert+blinn-phong and lambert+ggx.",
+        metavar="NAMES",
+        show_default=False,
+    ),
+]
+
+NoMcmcFlag = Annotated[
+    bool, typer.Option("--no-mcmc", help="Skip sampling: faster, intervals from Laplace's approximation.")
+]
+
+SeedFlag = Annotated[
+    int, typer.Option(min=0, help="Seed of the sampling; the same seed, the same report.", metavar="N")
+]
+
+FixFlag = Annotated[
+    list[str] | None,
+    typer.Option(help="Hold a parameter, e.g. ks=1; repeat for more.", metavar="NAME=VALUE", show_default=False),
+]
+
+MaskingFlag = Annotated[
+    str | None,
+    typer.Option(
+        help="Shadowing of microfacet lobes: correlated (default), separable or v-cavity.",
+        metavar="KIND",
+        show_default=False,
+    ),
+]
+
+LossFlag = Annotated[
+    str,
+    typer.Option(
+        help="What the fit minimises, see [bold]fitmat losses[/bold]: default, gaussian, student-t, mixture, log10 "
+        "and others",
+        metavar="NAME",
+    ),
+]
+
+PriorFlag = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="What is known beforehand: centre and standard deviation, e.g. eta=1.5,0.05; repeat for more.",
+        metavar="NAME=CENTRE,SD",
+        show_default=False,
+    ),
+]
+
+CheckPosteriorFlag = Annotated[
+    bool,
+    typer.Option(
+        "--check-posterior",
+        help="Sample each posterior a second time, with NUTS (pip install 'fitmat[nuts]'), and compare.",
+    ),
+]
+
+IorFlag = Annotated[
+    str | None,
+    typer.Option(
+        help="Material whose refractive index is fixed from the literature: Au, N-BK7, PMMA, or shelf/book/page of "
+        "refractiveindex.info, such as main/Cr/Rakic-BB (pip install 'fitmat[materials]').",
+        metavar="NAME",
+        show_default=False,
+    ),
+]
+
+TiltFlag = Annotated[
+    bool, typer.Option("--tilt", help="Fit how far the sample's normal leans in its mount, with every model.")
+]
