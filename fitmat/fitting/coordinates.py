@@ -109,14 +109,14 @@ class Coordinates:
         """The model at natural coordinates (k,), everything else as in `base`."""
         return with_vector(template, self.filled(base, natural))
 
-    def unbounded(self, values: Array) -> Array:
-        """Parameter vector (p,) to unbounded coordinates (k,); values on or outside a bound are nudged inside.
+    def unbounded(self, values: Numbers) -> Numbers:
+        """Parameter vectors (..., p) to unbounded coordinates (..., k); values on or outside a bound are nudged inside.
 
         MINUIT's sine, x = low + (high − low)(1 + sin u)/2 of the natural coordinate (James & Roos 1975): unlike a
         sigmoid it reaches a bound at finite u, so that a solver can stop there.
         """
-        t = 2.0 * (self.natural(values) - self.low) / self.span - 1.0
-        return jnp.arcsin(jnp.clip(t, -np.cos(EDGE), np.cos(EDGE)))
+        xp, t = library(values), 2.0 * (self.natural(values) - self.low) / self.span - 1.0
+        return xp.arcsin(xp.clip(t, -np.cos(EDGE), np.cos(EDGE)))
 
     def from_unbounded(self, base: Array, u: Array) -> Array:
         """Unbounded coordinates (k,) to a parameter vector (p,), always within the bounds."""

@@ -5,12 +5,11 @@ Gives the best parameters, how sure the data are of them locally (covariance), a
 
 import dataclasses
 from collections.abc import Mapping
+from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jaxtyping import Array, ArrayLike
 
 from fitmat.errors import FitmatError, ModelError
@@ -22,6 +21,7 @@ from fitmat.fitting.likelihood import (
     first_discrepancy,
     log_density,
     mapped,
+    predicted,
     prepare,
     transformed,
 )
@@ -30,26 +30,33 @@ from fitmat.fitting.losses import loss as find_loss
 from fitmat.fitting.priors import prepare_prior
 from fitmat.fitting.result import Ends, Fit, conclude
 from fitmat.fitting.starts import starting_points
-from fitmat.maths.least_squares import Minimum, Units, least_squares
+from fitmat.maths.least_squares import least_squares
+from fitmat.maths.programs import program
 from fitmat.measurements.noise import measured_noise
 from fitmat.measurements.samples import Measurements
 from fitmat.models.around.instrument import Seen
 from fitmat.models.around.noise import LEAST_ABSOLUTE, Noisy
-from fitmat.models.base import AbstractBRDF, evaluate_pairs
-from fitmat.models.parameters import check_range, entries, vector, with_vector
+from fitmat.models.base import AbstractBRDF
+from fitmat.models.parameters import as_parameter, check_range, entries, vector, with_vector
 from fitmat.models.registry import model
 
 STARTS = 6
 """How many of the best grid points are refined."""
 
-ROUNDS = 12
-"""At most this many alternations between parameters and discrepancy."""
+BURST = 3
+"""Looks at all residuals between two updates of the discrepancy."""
 
-MANY_ROWS = 8000
+MANY_ROWS = 8192
 """Above this many rows a fit converges on an evenly spread part first, then on all of them."""
 
 LITTLE_DAMPING = 1e-3
 """How much smaller the first damping is on all rows than on the part."""
+
+MAX_STEPS = 512
+"""Levenberg–Marquardt iterations per start."""
+
+SAME = 1e-3
+"""Ends of the part whose unbounded coordinates differ by less are one start for all rows."""
 
 STEADY = 1e-4
 """Relative offset (Bates & Watts 1981, who ask for 1e-3) at which a fit has converged even if its last digits move."""
@@ -66,7 +73,7 @@ def fit(
     priors: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
     loss: str = DEFAULT.name,
     masking: str | None = None,
-    max_steps: int = 256,
+    max_steps: int = MAX_STEPS,
 ) -> Fit:
     """Fit a model to measurements.
 
@@ -78,7 +85,7 @@ def fit(
             `fitmat.fitting.priors`.
         loss: What is minimised, by name (`fitmat.fitting.losses`); only a likelihood supports a posterior.
         masking: Static masking choice for the microfacet lobes of a named model.
-        max_steps: Levenberg–Marquardt iterations per start and round.
+        max_steps: Levenberg–Marquardt iterations per start.
 
     Returns:
         A `Fit`; a numerical failure is its `result`, not an exception.
@@ -121,7 +128,7 @@ def fit(
     starts = starting_points(template, data, first, held, STARTS)
     added = np.asarray(vector(shown))[len(vector(template)) :]
     starts = np.column_stack([starts, np.tile(added, (len(starts), 1))])
-    ends = jax.device_get(refine(shown, data, jnp.asarray(starts), first, moved, max_steps))
+    ends = optima(shown, data, starts, moved, max_steps)
     return conclude(measurements, shown, held, (found_noise, data), ends)
 
 
@@ -133,8 +140,8 @@ def _seen(template: AbstractBRDF, m: Measurements) -> AbstractBRDF:
     return Seen(
         template,
         dataclasses.replace(m.instrument, calibration=0.0),  # static: each value would be compiled for
-        scale=jnp.ones(()) if m.instrument.calibration else None,
-        dark=jnp.clip(0.5 * dark, 1e-6, 0.5) if m.instrument.dark is None else None,
+        scale=as_parameter(1.0) if m.instrument.calibration else None,
+        dark=np.clip(0.5 * dark, 1e-6, 0.5) if m.instrument.dark is None else None,
     )
 
 
@@ -157,12 +164,69 @@ def _held(template: AbstractBRDF, fixed: Mapping[str, ArrayLike]) -> dict[str, n
             raise ModelError(f"fixed {name} has {given.size} values: expected 1 or {sizes[name].size}.")
         values[sizes[name].place] = given
         held[name] = values[sizes[name].place].copy()
-    check_range(with_vector(template, jnp.asarray(values)))
+    check_range(with_vector(template, values))
     return held
 
 
-@eqx.filter_jit
-def refine(template: AbstractBRDF, data: Data, starts: Array, first: Array, moved: Coordinates, max_steps: int) -> Ends:
+def optima(
+    template: AbstractBRDF, data: Data, starts: np.ndarray, moved: Coordinates, max_steps: int = MAX_STEPS
+) -> Ends:
+    """Where the starts end, as `refine` has it; of many rows first on a part of them, then on all.
+
+    Args:
+        template: Gives shapes, bounds and static choices.
+        data: The samples.
+        starts: Physical parameter vectors, (k, p).
+        moved: The parameters that are fitted.
+        max_steps: Levenberg–Marquardt iterations per start.
+    """
+    rows = data.x.shape[0]
+    if rows <= MANY_ROWS:
+        return _refined(template, data, starts, first_discrepancy(data), moved, max_steps)
+    part = data.every(-(-rows // (MANY_ROWS // 2)))
+    coarse = _refined(template, part, starts, first_discrepancy(part), moved, max_steps)
+    which = _distinct(coarse, moved)
+    distinct = np.unique(which)
+    begin = max(float(coarse.discrepancy[distinct[0]]), 1e-2 * float(first_discrepancy(data)))
+    fine = _refined(template, data, coarse.values[distinct], np.asarray(begin), moved, max_steps, LITTLE_DAMPING)
+    place = np.searchsorted(distinct, which)
+    return Ends(*(column[place] for column in fine[:-1]), steps=fine.steps[place] + coarse.steps)
+
+
+def _distinct(ends: Ends, moved: Coordinates) -> np.ndarray:
+    """For each end, the best one that is the same, (k,)."""
+    u = np.asarray(moved.unbounded(ends.values))
+    better = np.argsort(-np.nan_to_num(ends.log_likelihood, nan=-np.inf), kind="stable")
+    same = np.abs(u[:, None] - u).max(axis=2, initial=0.0) < SAME
+    return np.array([next(j for j in better if j == k or same[j, k]) for k in range(len(u))])
+
+
+def _refined(
+    template: AbstractBRDF,
+    data: Data,
+    starts: np.ndarray,
+    first: np.ndarray,
+    moved: Coordinates,
+    max_steps: int,
+    damping: float = 1.0,
+) -> Ends:
+    """`refine` of at most `STARTS` starts, by one program however many there are."""
+    count = len(starts)
+    filled = np.concatenate([starts, np.repeat(starts[:1], STARTS - count, axis=0)])
+    counts, scalars = np.array([count, max_steps]), np.array([first, damping])
+    found = refine(template, data, filled, counts, scalars, moved)
+    return Ends(*(np.asarray(part)[:count] for part in found))
+
+
+@program
+def refine(
+    template: AbstractBRDF,
+    data: Data,
+    starts: ArrayLike,
+    counts: ArrayLike,
+    scalars: ArrayLike,
+    moved: Coordinates,
+) -> tuple[Array, Array, Array, Array, Array]:
     """Alternate Levenberg–Marquardt over the parameters and the best discrepancy, from every start.
 
     In a location–scale family the two are information-orthogonal, so that a few rounds settle both.
@@ -171,63 +235,53 @@ def refine(template: AbstractBRDF, data: Data, starts: Array, first: Array, move
         template: Gives shapes, bounds and static choices.
         data: The samples, with their loss and prior.
         starts: Physical parameter vectors, (k, p), which also hold what is fixed.
-        first: A first guess of the discrepancy.
+        counts: How many of the starts are refined, and how many iterations each may take.
+        scalars: A first guess of the discrepancy, and of λ as `least_squares` has it.
         moved: The parameters that are fitted.
-        max_steps: Levenberg–Marquardt iterations per start and round.
+
+    Returns:
+        The fields of `Ends`.
     """
+    count, max_steps = jnp.asarray(counts)
+    first, damping = jnp.asarray(scalars)
 
     def at(base: Array, u: Array) -> AbstractBRDF:
         return with_vector(template, moved.from_unbounded(base, u))
 
-    def settle(data: Data, base: Array, u: Array, s: Array) -> tuple[Array, ...]:
-        def body(state: tuple) -> tuple:
-            u, s, _, _, steps, rounds = state
-            end = descend((template, moved), data, base, u, s, max_steps=max_steps)
-            predicted = evaluate_pairs(at(base, end.x), data.wi, data.wo) * data.kappa
-            updated = best_discrepancy(predicted, data, s)
+    def one(base: Array) -> tuple[Array, ...]:
+        def residual(u: Array, args: tuple[Array, Array]) -> Array:
+            s, measured = args
+            return every_residual(at(base, u), data, s, measured)
+
+        def body(state: _Stand) -> _Stand:
+            s = state.discrepancy
+            left = jnp.minimum(BURST, max_steps - state.steps)
+            args = (s, transformed(data, s))
+            end = least_squares(residual, state.u, args, max_steps=left, damping=state.damping)
+            best = at(base, end.x)
+            x = predicted(best, data)
+            updated = best_discrepancy(x, data, s)
             settled = jnp.abs(updated - s) <= SETTLED * s
-            solved = (end.result == optx.RESULTS.successful) | (end.offset < STEADY)
-            return end.x, updated, settled, solved, steps + end.steps, rounds + 1
+            ended, steady = settled & end.solved, settled & (end.offset < STEADY)
+            value = log_density(best, data, updated, x)
+            return _Stand(end.x, updated, end.damping, value, ended, steady, state.steps + end.steps)
 
-        begin = (u, s, jnp.array(False), jnp.array(False), jnp.array(0), jnp.array(0))
-        return jax.lax.while_loop(lambda state: ~state[2] & (state[5] < ROUNDS), body, begin)
+        begin, no = first if data.loss.infers_discrepancy else 0.0 * first, jnp.array(False)
+        start = _Stand(moved.unbounded(base), begin, damping, jnp.zeros(()), no, no, jnp.array(0))
+        end = jax.lax.while_loop(lambda state: ~state.ended & (state.steps < max_steps), body, start)
+        best = moved.from_unbounded(base, end.u)
+        return best, end.discrepancy, end.log_density, end.ended | end.steady, end.steps
 
-    def one(base: Array) -> Ends:
-        begin = first if data.loss.infers_discrepancy else jnp.zeros(())
-        u, s, settled, solved, steps, _ = settle(data, base, moved.unbounded(base), begin)
-        best = at(base, u)
-        return Ends(vector(best), s, log_density(best, data, s), settled & solved, steps)
-
-    return mapped(one, starts)
+    return mapped(one, jnp.asarray(starts), count)
 
 
-def descend(
-    what: tuple[AbstractBRDF, Coordinates], data: Data, base: Array, u: Array, s: Array, *, max_steps: int = 256
-) -> Minimum:
-    """Levenberg–Marquardt over unbounded coordinates with the discrepancy held; first on a part of many rows.
+class _Stand(NamedTuple):
+    """Where one start stands."""
 
-    Args:
-        what: The model and which of its parameters are fitted.
-        data: The samples.
-        base: Physical parameter vector that holds what is fixed, (p,).
-        u: Where to start, unbounded coordinates.
-        s: Discrepancy.
-        max_steps: Iterations allowed on all rows.
-    """
-    template, moved = what
-
-    def residual(u: Array, args: tuple[Data, Array, Array, Array]) -> Array:
-        data, base, s, measured = args
-        return every_residual(with_vector(template, moved.from_unbounded(base, u)), data, s, measured)
-
-    def minimum(data: Data, u: Array, units: Units | None) -> Minimum:
-        measured = transformed(data, s)
-        return least_squares(residual, u, (data, base, s, measured), max_steps=max_steps, units=units)
-
-    rows = data.x.shape[0]
-    if rows <= MANY_ROWS:
-        return minimum(data, u, None)
-    stride = rows // (MANY_ROWS // 2)
-    coarse = minimum(data.every(stride), u, None)
-    # So close to the end hardly any damping is needed: λ is relative to the square of the unit.
-    return minimum(data, coarse.x, Units(coarse.units.x * LITTLE_DAMPING**-0.5, coarse.units.residual * stride**0.5))
+    u: Array
+    discrepancy: Array
+    damping: Array
+    log_density: Array
+    ended: Array
+    steady: Array
+    steps: Array

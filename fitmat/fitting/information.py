@@ -3,18 +3,17 @@
 It finds no optimum and names no outcome.
 """
 
-from collections.abc import Callable
-
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from fitmat.fitting.coordinates import Coordinates, coordinates
-from fitmat.fitting.likelihood import Data, every_residual, noise_scale, residuals
+from fitmat.fitting.likelihood import Data, every_residual, mapped, misfits
+from fitmat.maths.least_squares import normal_equations
+from fitmat.maths.programs import program
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import entries, vector
+from fitmat.models.values import at, slices
 
 UNDETERMINED = {"log": 1.0, "linear": 0.3}
 """A parameter whose standard deviation exceeds this (in ln p, or as a fraction of its range) is not determined."""
@@ -23,25 +22,73 @@ FOLLOWS, MISSES = 0.5, 2.0
 """Ratios of discrepancy to noise up to which a model follows the data, and from which it is inadequate."""
 
 
-def _cost_terms(best: AbstractBRDF, data: Data, s: Array) -> tuple[Callable[[Array], Array], Array]:
-    """The residuals as a function of the natural coordinates, and those of `best`."""
-    every, values = coordinates(best), vector(best)
-    return lambda t: every_residual(every.model(best, values, t), data, s), every.natural(values)
+DIFFERENCE = 3e-4
+"""Steps of the finite differences in standard deviations: errors of 1e-8 from curvature and from rounding."""
+
+AT_ONCE = 16
+"""Points for which the program of `normal_equations_at` is compiled."""
 
 
-@eqx.filter_jit
-def expected_information(best: AbstractBRDF, data: Data, s: Array) -> Array:
-    """JᵀJ in natural coordinates, (p, p)."""
-    residual, at = _cost_terms(best, data, s)
-    jacobian = jax.jacfwd(residual)(at)
-    return jacobian.T @ jacobian
+def normal_equations_at(
+    template: AbstractBRDF, data: Data, points: Float[np.ndarray, "m p"], s: float
+) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, "m p"], Float[np.ndarray, "m p p"]]:
+    """Σ residual², Jᵀr and JᵀJ in the natural coordinates of all parameters, the prior's rows included.
+
+    Args:
+        template: Gives shapes, bounds and static choices.
+        data: The samples.
+        points: Natural coordinates.
+        s: Discrepancy.
+    """
+    every, size, found = coordinates(template), 0, []
+    for part in slices(len(points), AT_ONCE):
+        size = part.stop - part.start
+        filled = np.concatenate([points[part], np.repeat(points[part][:1], AT_ONCE - size, axis=0)])
+        some = _normal_equations(template, data, filled, np.asarray(float(s)), np.array(size), every)
+        found.append([np.asarray(one)[:size] for one in some])
+    square, slope, gram = (np.concatenate(one) for one in zip(*found, strict=True))
+    return square, slope, gram
 
 
-@eqx.filter_jit
-def observed_information(best: AbstractBRDF, data: Data, s: Array) -> Array:
-    """The Hessian of ½Σ residual² in natural coordinates, (p, p); compiles three times as long as JᵀJ."""
-    residual, at = _cost_terms(best, data, s)
-    return jax.jacfwd(jax.jacfwd(lambda t: 0.5 * jnp.sum(residual(t) ** 2)))(at)
+@program
+def _normal_equations(
+    template: AbstractBRDF, data: Data, points: ArrayLike, s: ArrayLike, count: ArrayLike, every: Coordinates
+) -> tuple[Array, Array, Array]:
+    base = vector(template)
+
+    def one(t: Array) -> tuple[Array, Array, Array]:
+        found = normal_equations(lambda at: every_residual(every.model(template, base, at), data, jnp.asarray(s)), t)
+        return found.square, found.slope, found.gram
+
+    return mapped(one, jnp.asarray(points), count)
+
+
+def expected_information(best: AbstractBRDF, data: Data, s: float) -> Float[np.ndarray, "p p"]:
+    """JᵀJ in natural coordinates."""
+    return normal_equations_at(best, data, coordinates(best).natural(vector(best))[None], s)[2][0]
+
+
+def observed_information(best: AbstractBRDF, data: Data, s: float, expected: np.ndarray) -> Float[np.ndarray, "p p"]:
+    """The Hessian of ½Σ residual² in natural coordinates, by central differences of Jᵀr; one-sided at a bound.
+
+    Args:
+        best: Where.
+        data: The samples.
+        s: Discrepancy.
+        expected: `expected_information` there.
+    """
+    every = coordinates(best)
+    here, count = every.natural(vector(best)), every.count
+    with np.errstate(divide="ignore"):
+        sd = 1.0 / np.sqrt(np.maximum(np.diagonal(expected), 0.0))
+    h = DIFFERENCE * np.minimum(sd, every.span)
+    shift = np.where(here - h < every.low, 1.0, np.where(here + h > every.high, -1.0, 0.0))
+    points = here + np.concatenate([np.diag(h * (shift + side)) for side in (-1.0, 0.0, 1.0)])
+    before, middle, after = normal_equations_at(best, data, points, s)[1].reshape(3, count, count)
+    slope = (after - before) / (2.0 * h[:, None])
+    bend = (after - 2.0 * middle + before) / h[:, None]
+    hessian = slope - shift[:, None] * bend  # of the parabola through the three, at the best point
+    return 0.5 * (hessian + hessian.T)
 
 
 def information(best: AbstractBRDF, data: Data, s: float, free: np.ndarray) -> Float[np.ndarray, "p p"]:
@@ -52,12 +99,12 @@ def information(best: AbstractBRDF, data: Data, s: float, free: np.ndarray) -> F
     shrinks residuals or infers the noise, JᵀJ is not the information at all. An objective does not say how far the
     data scatter: the mean square of its residuals does.
     """
-    expected = np.asarray(expected_information(best, data, jnp.asarray(s)))
+    expected = expected_information(best, data, s)
     if data.loss.spread is None:
         return expected / _mean_square(best, data, len(free))
-    if data.loss.linear and s < FOLLOWS * float(noise_scale(data)):
+    if data.loss.linear and s < FOLLOWS * float(data.typical):
         return expected
-    observed = np.asarray(observed_information(best, data, jnp.asarray(s)))
+    observed = observed_information(best, data, s, expected)
     return observed if is_positive(observed[np.ix_(free, free)]) else expected
 
 
@@ -70,11 +117,8 @@ def is_positive(information: np.ndarray) -> bool:
 
 
 def _mean_square(best: AbstractBRDF, data: Data, parameters: int) -> float:
-    r = np.asarray(_residuals(best, data, jnp.zeros(())))
+    r = misfits(at(best, data.wi, data.wo) * data.kappa, data.noise, data, np.zeros(()))
     return max(float(np.sum(r**2)) / max(np.count_nonzero(data.weight) - parameters, 1), 1e-300)
-
-
-_residuals = eqx.filter_jit(residuals)
 
 
 def inverse_information(information: np.ndarray, span: np.ndarray) -> np.ndarray:

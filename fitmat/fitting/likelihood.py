@@ -8,6 +8,7 @@ gains nothing by inflating itself. Other losses come from `losses`.
 This room knows no solver, no sampler and no particular model.
 """
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
@@ -15,9 +16,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
-from fitmat._types import Directions, Samples, Scalar
+from fitmat._types import Samples, Scalar
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.losses import DEFAULT, Loss
 from fitmat.fitting.stabilising import spread
@@ -38,13 +39,13 @@ class Prior(eqx.Module):
         discrepancy: 1/sd of the half-normal of s; 0 where its prior is flat.
     """
 
-    mean: Float[Array, " p"]
-    precision: Float[Array, " p"]
-    discrepancy: Scalar
+    mean: Any
+    precision: Any
+    discrepancy: Any
 
 
 class Data(eqx.Module):
-    """Samples as the likelihood sees them; masked values and filling rows have weight 0.
+    """Samples as the likelihood sees them, in NumPy's arrays outside of programs; masked and filling rows weigh 0.
 
     Attributes:
         wi: Directions to the light, (n, 3).
@@ -56,17 +57,19 @@ class Data(eqx.Module):
         prior: Of the model's parameters; None where it is flat.
         loss: What a fit minimises.
         level: |f| as the neighbouring angles show it, in sr⁻¹, (n, c), where the noise is inferred; else None.
+        typical: The s whose discrepancy equals the noise for the typical sample, in sr^(−1/3).
     """
 
-    wi: Directions
-    wo: Directions
-    x: Samples
-    noise: Samples
-    kappa: Float[Array, "n 1"]
-    weight: Samples
+    wi: Any
+    wo: Any
+    x: Any
+    noise: Any
+    kappa: Any
+    weight: Any
     prior: Prior | None = None
     loss: Loss = eqx.field(static=True, default=DEFAULT)
-    level: Samples | None = None
+    level: Any = None
+    typical: Any = 0.0
 
     def told(self, free: np.ndarray) -> np.ndarray:
         """Which of the free parameters have a prior that is not flat, as `free`."""
@@ -77,11 +80,11 @@ class Data(eqx.Module):
         arrays = (self.wi, self.wo, self.x, self.noise, self.kappa, self.weight)
         wi, wo, x, noise, kappa, weight = (part[::stride] for part in arrays)
         level = None if self.level is None else self.level[::stride]
-        return Data(wi, wo, x, noise, kappa, weight, self.prior, self.loss, level)
+        return Data(wi, wo, x, noise, kappa, weight, self.prior, self.loss, level, self.typical)
 
     def under(self, loss: Loss) -> "Data":
         """The same samples under another loss and a flat prior."""
-        return Data(self.wi, self.wo, self.x, self.noise, self.kappa, self.weight, None, loss)
+        return dataclasses.replace(self, prior=None, loss=loss, level=None)
 
 
 def prepare(m: Measurements, noise: Noise, prior: Prior | None = None, loss: Loss = DEFAULT) -> Data:
@@ -96,10 +99,10 @@ def prepare(m: Measurements, noise: Noise, prior: Prior | None = None, loss: Los
     weight = m.valid if loss.usable is None else m.valid & loss.usable(m)
     parts = (m.wi, m.wo, m.value * kappa, sigma * kappa, kappa, weight.astype(float))
     extra = padded_length(len(kappa)) - len(kappa)
-    padded = (jnp.asarray(_padded(part, extra, fill)) for part, fill in zip(parts, _FILL, strict=True))
-    level = jnp.asarray(_padded(levels(m), extra, 1.0)) if loss.infers_noise else None
+    padded = (_padded(part, extra, fill) for part, fill in zip(parts, _FILL, strict=True))
+    level = _padded(levels(m), extra, 1.0) if loss.infers_noise else None
     wi, wo, x, deviation, kappa, weight = padded
-    return Data(wi, wo, x, deviation, kappa, weight, prior, loss, level)
+    return Data(wi, wo, x, deviation, kappa, weight, prior, loss, level, noise_scale(x, deviation, weight))
 
 
 _FILL = ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 0.0, 1.0, 1.0, 0.0)
@@ -110,9 +113,21 @@ def _padded(part: np.ndarray, extra: int, fill: float | tuple[float, ...]) -> np
     return np.concatenate([part, np.broadcast_to(np.asarray(fill), (extra, part.shape[1]))])
 
 
-def residuals(model: AbstractBRDF, data: Data, s: Scalar) -> Samples:
-    """T(y κ) − T(f κ), shrunk as the loss has it, (n, c), unit variance under a likelihood; 0 where masked."""
-    return residuals_from(transformed(data, s), model, data, s)
+def predicted(model: AbstractBRDF, data: Data) -> Samples:
+    """f κ at the samples, (n, c)."""
+    return evaluate_pairs(model, data.wi, data.wo) * data.kappa
+
+
+def residuals(model: AbstractBRDF, data: Data, s: Scalar, x: Samples | None = None) -> Samples:
+    """T(y κ) − T(f κ), shrunk as the loss has it, (n, c), unit variance under a likelihood; 0 where masked.
+
+    Args:
+        model: Where to evaluate.
+        data: The samples.
+        s: Discrepancy.
+        x: `predicted`, where it is at hand.
+    """
+    return residuals_from(transformed(data, s), model, data, s, x)
 
 
 def transformed(data: Data, s: Scalar) -> Samples:
@@ -120,23 +135,22 @@ def transformed(data: Data, s: Scalar) -> Samples:
     return data.loss.transform(data.x, data.noise, data.kappa, s)
 
 
-def residuals_from(measured: Samples, model: AbstractBRDF, data: Data, s: Scalar) -> Samples:
+def residuals_from(measured: Samples, model: AbstractBRDF, data: Data, s: Scalar, x: Samples | None = None) -> Samples:
     """`residuals` with T(y κ) given, for loops in which s stays; where the noise is inferred it is not used."""
-    predicted = evaluate_pairs(model, data.wi, data.wo) * data.kappa
-    noise = data.noise
+    x, noise = predicted(model, data) if x is None else x, data.noise
     if data.loss.infers_noise:
         noise = inferred_noise(model, data)
         measured = data.loss.transform(data.x, noise, data.kappa, s)
-    return _apart(measured, predicted, noise, data, s)
+    return _apart(measured, x, noise, data, s)
 
 
-def _apart(measured: Any, predicted: Any, noise: Any, data: Data, s: Any) -> Any:
-    return data.weight * data.loss.shrink(measured - data.loss.transform(predicted, noise, data.kappa, s))
+def _apart(measured: Any, x: Any, noise: Any, data: Data, s: Any) -> Any:
+    return data.weight * data.loss.shrink(measured - data.loss.transform(x, noise, data.kappa, s))
 
 
-def misfits(predicted: Any, noise: Any, data: Data, s: Any) -> Any:
+def misfits(x: Any, noise: Any, data: Data, s: Any) -> Any:
     """`residuals` of given model values f κ and noise σ κ, (…, n, c); of NumPy arrays where `data` holds such."""
-    return _apart(data.loss.transform(data.x, noise, data.kappa, s), predicted, noise, data, s)
+    return _apart(data.loss.transform(data.x, noise, data.kappa, s), x, noise, data, s)
 
 
 def inferred_noise(model: AbstractBRDF, data: Data) -> Samples:
@@ -182,10 +196,10 @@ def every_residual(model: AbstractBRDF, data: Data, s: Scalar, measured: Samples
     return jnp.concatenate([samples, *beside, *known]) if beside or known else samples
 
 
-def log_density(model: AbstractBRDF, data: Data, s: Scalar) -> Scalar:
+def log_density(model: AbstractBRDF, data: Data, s: Scalar, x: Samples | None = None) -> Scalar:
     """`log_likelihood` and the log prior density, up to the prior's constant."""
     apart = prior_residuals(model, data)
-    return log_likelihood(model, data, s) - 0.5 * jnp.vdot(apart, apart) - discrepancy_cost(data, s)
+    return log_likelihood(model, data, s, x) - 0.5 * jnp.vdot(apart, apart) - discrepancy_cost(data, s)
 
 
 def discrepancy_cost(data: Data, s: Scalar) -> Scalar:
@@ -193,16 +207,16 @@ def discrepancy_cost(data: Data, s: Scalar) -> Scalar:
     return jnp.zeros(()) if data.prior is None else 0.5 * (data.prior.discrepancy * s) ** 2
 
 
-def log_likelihood(model: AbstractBRDF, data: Data, s: Scalar) -> Scalar:
+def log_likelihood(model: AbstractBRDF, data: Data, s: Scalar, x: Samples | None = None) -> Scalar:
     """Log density of the measured values (in sr⁻¹), noise and discrepancy included; of an objective −½ Σ residual²."""
-    r = residuals(model, data, s)
+    r = residuals(model, data, s, x)
     # Dot products, not sums: XLA fuses a sum with what it adds up into a scalar loop, five times slower on a CPU.
     return -0.5 * jnp.vdot(r, r) - jnp.vdot(data.weight, _log_spread(model, data, s))
 
 
-def log_pointwise(predicted: Any, noise: Any, data: Data, s: Any) -> Any:
+def log_pointwise(x: Any, noise: Any, data: Data, s: Any) -> Any:
     """The terms of `log_likelihood`, one for each value, of what `misfits` takes; of no meaning where one is masked."""
-    return -0.5 * misfits(predicted, noise, data, s) ** 2 - _log_width(noise, data, s)
+    return -0.5 * misfits(x, noise, data, s) ** 2 - _log_width(noise, data, s)
 
 
 def _log_spread(model: AbstractBRDF, data: Data, s: Scalar) -> Samples:
@@ -217,11 +231,11 @@ def _log_width(noise: Any, data: Data, s: Any) -> Any:
     return xp.log(data.loss.spread(data.x, noise, data.kappa, s)) - xp.log(data.kappa) - data.loss.log_peak
 
 
-def best_discrepancy(predicted: Samples, data: Data, start: Scalar) -> Scalar:
+def best_discrepancy(x: Samples, data: Data, start: Scalar) -> Scalar:
     """The s ≥ 0 that maximises the likelihood for given model values.
 
     Args:
-        predicted: Model f κ, (n, c).
+        x: `predicted`, (n, c).
         data: The samples.
         start: A positive first guess.
 
@@ -233,43 +247,58 @@ def best_discrepancy(predicted: Samples, data: Data, start: Scalar) -> Scalar:
 
     def cost(t: Scalar) -> Scalar:
         s = jnp.exp(t)
-        apart = transformed(data, s) - data.loss.transform(predicted, data.noise, data.kappa, s)
-        r = data.loss.shrink(apart)
+        r = data.loss.shrink(transformed(data, s) - data.loss.transform(x, data.noise, data.kappa, s))
         logs = jnp.log(spread(data.x, data.noise, s))
         return jnp.vdot(data.weight, 0.5 * r**2 + logs) + discrepancy_cost(data, s)
 
-    slope = jax.grad(cost)
-    floor = jnp.log(NEGLIGIBLE * noise_scale(data))
+    one, floor = jnp.ones(()), jnp.log(NEGLIGIBLE * data.typical)
 
-    def step(_: int, t: Scalar) -> Scalar:
-        g, curvature = jax.jvp(slope, (t,), (jnp.ones_like(t),))
-        newton = -g / jnp.maximum(jnp.abs(curvature), 1e-3)
-        return jnp.clip(t + jnp.clip(newton, -2.0, 2.0), floor, floor + 40.0)
+    def step(state: tuple[Scalar, Scalar, Array]) -> tuple[Scalar, Scalar, Array]:
+        t, _, count = state
+        g, curvature = jax.jvp(lambda t: jax.jvp(cost, (t,), (one,))[1], (t,), (one,))
+        newton = jnp.clip(-g / jnp.maximum(jnp.abs(curvature), 1e-3), -2.0, 2.0)
+        moved = jnp.clip(t + newton, floor, floor + 40.0)
+        return moved, jnp.abs(moved - t), count + 1
 
-    t = jax.lax.fori_loop(0, 12, step, jnp.maximum(jnp.log(start), floor + 1.0))
+    begin = jnp.maximum(jnp.log(start), floor + 1.0)
+    t, _, _ = jax.lax.while_loop(lambda state: (state[1] > STILL) & (state[2] < 12), step, (begin, one, jnp.array(0)))
     return jnp.where(t > floor + 1e-6, jnp.exp(t), 0.0)
 
 
-def mapped(function: Callable[[Array], Any], items: Array) -> Any:
-    """`function` of every item: one after the other on a CPU, all at once on an accelerator.
+def mapped(function: Callable[[Array], Any], items: Array, count: ArrayLike | None = None) -> Any:
+    """`function` of the first `count` items: one after the other on a CPU, all at once on an accelerator.
 
     On a few cores the loop compiles in half the time and runs twice as fast, because each pass stays in the cache.
+    What stands behind the first ones is of no meaning.
     """
-    return jax.lax.map(function, items) if jax.default_backend() == "cpu" else jax.vmap(function)(items)
+    if jax.default_backend() != "cpu":
+        return jax.vmap(function)(items)
+    if count is None:
+        return jax.lax.map(function, items)
+    shapes = jax.eval_shape(function, items[0])
+    empty = jax.tree.map(lambda part: jnp.zeros((len(items), *part.shape), part.dtype), shapes)
+
+    def step(k: Array, found: Any) -> Any:
+        return jax.tree.map(lambda whole, part: whole.at[k].set(part), found, function(items[k]))
+
+    return jax.lax.fori_loop(0, count, step, empty)
 
 
 NEGLIGIBLE = 1e-3
 """A discrepancy below this fraction of the noise is reported as none."""
 
-
-@jax.jit
-def noise_scale(data: Data) -> Scalar:
-    """The s whose discrepancy equals the noise for the typical sample, in sr^(−1/3)."""
-    ratio = data.noise / (3.0 * jnp.cbrt(jnp.abs(data.x) + data.noise) ** 2)
-    return jnp.nanmedian(jnp.where(data.weight > 0, ratio, jnp.nan))
+STILL = 1e-10
+"""Relative step at which Newton's method for the discrepancy ends."""
 
 
-@jax.jit
-def first_discrepancy(data: Data) -> Scalar:
+def noise_scale(x: np.ndarray, noise: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """The s whose discrepancy equals the noise for the typical sample, in sr^(−1/3); NaN where there is none."""
+    used = weight > 0
+    if not used.any():
+        return np.array(np.nan)
+    return np.asarray(np.median(noise[used] / (3.0 * np.cbrt(np.abs(x[used]) + noise[used]) ** 2)))
+
+
+def first_discrepancy(data: Data) -> np.ndarray:
     """A first s before anything is fitted: a tenth of the typical ∛x."""
-    return 0.1 * jnp.nanmedian(jnp.where(data.weight > 0, jnp.cbrt(jnp.abs(data.x)), jnp.nan))
+    return np.asarray(0.1 * np.median(np.cbrt(np.abs(data.x[data.weight > 0]))))

@@ -9,7 +9,6 @@ scale is log. A shared scale g has ln g ~ N(0, calibration²).
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 from scipy.stats import truncnorm
@@ -57,7 +56,7 @@ def prepare_prior(
         precision[entry.place] = np.where(log, middle, 1.0) / spread
     if not precision.any() and not discrepancy:
         return None
-    return Prior(jnp.asarray(mean), jnp.asarray(precision), jnp.asarray(discrepancy))
+    return Prior(mean, precision, np.asarray(discrepancy))
 
 
 def _inside(entry: Entry, centre: ArrayLike) -> np.ndarray:

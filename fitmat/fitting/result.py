@@ -6,20 +6,21 @@ Finds nothing itself; `fitting` does.
 import dataclasses
 import functools
 import math
+from typing import NamedTuple
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from fitmat.fitting.coordinates import Coordinates, coordinates
 from fitmat.fitting.information import FOLLOWS, MISSES, covariance, information
-from fitmat.fitting.likelihood import Data, best_discrepancy, first_discrepancy, noise_scale
+from fitmat.fitting.likelihood import Data, best_discrepancy, first_discrepancy
 from fitmat.fitting.losses import DEFAULT, Loss
+from fitmat.maths.programs import program
 from fitmat.measurements.noise import Noise
 from fitmat.measurements.samples import Measurements
-from fitmat.models.base import AbstractBRDF, evaluate_pairs
+from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import Entry, entries, vector, with_vector
+from fitmat.models.values import at
 from fitmat.text import html_table, text_table, with_error
 
 AGREE = 0.1
@@ -128,7 +129,7 @@ class Fit:
     @property
     def misfit_ratio(self) -> float:
         """Discrepancy over measurement noise for the typical sample: the adequacy of the model."""
-        return self.misfit / max(float(noise_scale(self.data)), 1e-300)
+        return self.misfit / max(float(self.data.typical), 1e-300)
 
     @property
     def adequacy(self) -> str:
@@ -179,14 +180,14 @@ class Fit:
         return self.n_inferred * np.log(self.n_values) - 2 * self.log_likelihood
 
 
-class Ends(eqx.Module):
+class Ends(NamedTuple):
     """Where k starts ended; every array begins with k."""
 
-    values: Array
-    discrepancy: Array
-    log_likelihood: Array
-    solved: Array
-    steps: Array
+    values: np.ndarray
+    discrepancy: np.ndarray
+    log_likelihood: np.ndarray
+    solved: np.ndarray
+    steps: np.ndarray
 
 
 def conclude(
@@ -201,7 +202,7 @@ def conclude(
     usable = np.isfinite(ends.log_likelihood) & np.isfinite(ends.values).all(axis=1)
     scores = np.where(usable, ends.log_likelihood, -np.inf)
     k = int(np.argmax(scores))
-    best = with_vector(template, jnp.asarray(ends.values[k]))
+    best = with_vector(template, ends.values[k])
     s = float(ends.discrepancy[k])
     moved = coordinates(template, held)
     on_bound = bool(moved.side(np.asarray(ends.values[k])).any())
@@ -230,13 +231,10 @@ def conclude(
 
 def _misfit(best: AbstractBRDF, data: Data) -> float:
     plain = data.under(DEFAULT)
-    return float(_default_discrepancy(best, plain))
+    return float(_discrepancy(at(best, data.wi, data.wo) * data.kappa, plain, first_discrepancy(plain)))
 
 
-@eqx.filter_jit
-def _default_discrepancy(best: AbstractBRDF, data: Data) -> Array:
-    predicted = evaluate_pairs(best, data.wi, data.wo) * data.kappa
-    return best_discrepancy(predicted, data, first_discrepancy(data))
+_discrepancy = program(best_discrepancy)
 
 
 def named_outcome(usable: bool, solved: bool, on_bound: bool, undetermined: tuple[str, ...]) -> str:

@@ -5,26 +5,30 @@ Gives starts; refines none of them.
 
 import itertools
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from fitmat.fitting.likelihood import Data
 from fitmat.fitting.stabilising import spread, stabilised
-from fitmat.models.base import AbstractBRDF, evaluate_pairs
-from fitmat.models.parameters import Entry, entries, vector, with_vector
+from fitmat.models.base import AbstractBRDF
+from fitmat.models.parameters import Entry, entries, vector
+from fitmat.models.values import SMALL, slices, values
 
-MAX_ROWS = 4000
+MAX_ROWS = SMALL[1]
 """The grid looks at no more rows than this, evenly spread over the file."""
+
+MOST_NUMBERS = 4_000_000
+"""Values of the model that are held at a time."""
 
 SWEEPS = 300
 """Coordinate-descent sweeps of the non-negative least squares; two lobes need far fewer."""
 
+STILL = 1e-12
+"""Relative change of the weights at which the sweeps end."""
+
 
 def starting_points(
-    model: AbstractBRDF, data: Data, s: Array, held: dict[str, np.ndarray], count: int
+    model: AbstractBRDF, data: Data, s: np.ndarray, held: dict[str, np.ndarray], count: int
 ) -> Float[np.ndarray, "k p"]:
     """The `count` best parameter vectors of the grid, best first.
 
@@ -38,15 +42,17 @@ def starting_points(
     Returns:
         Physical parameter vectors; fewer than `count` rows where the grid is smaller.
     """
-    every = entries(model)
-    stride = max(1, -(-data.x.shape[0] // MAX_ROWS))
-    thinned = data.every(stride)
-    free = [e for e in every if e.name not in held]
+    free = [e for e in entries(model) if e.name not in held]
     nodes = np.array(_nodes(model, [e for e in free if not e.param.weight], held), float)
-    weights = np.concatenate([np.arange(e.place.start, e.place.stop) for e in free if e.param.weight] or [[]])
-    ranked, cost = _solve_nodes(model, thinned, s, jnp.asarray(nodes), tuple(int(w) for w in weights))
-    order = np.argsort(np.nan_to_num(np.asarray(cost), nan=np.inf))
-    return np.asarray(ranked)[order[:count]]
+    places = np.array([k for e in free if e.param.weight for k in range(e.place.start, e.place.stop)], int)
+    thinned = data.every(-(-data.x.shape[0] // MAX_ROWS))
+    per_node = (2 + len(places)) * thinned.x.size
+    found = [
+        _solve_nodes(model, thinned, s, nodes[part], places)
+        for part in slices(len(nodes), max(1, MOST_NUMBERS // per_node))
+    ]
+    solved, cost = (np.concatenate(part) for part in zip(*found, strict=True))
+    return solved[np.argsort(np.nan_to_num(cost, nan=np.inf), kind="stable")[:count]]
 
 
 def _nodes(model: AbstractBRDF, shapes: list[Entry], held: dict[str, np.ndarray]) -> list[np.ndarray]:
@@ -55,66 +61,70 @@ def _nodes(model: AbstractBRDF, shapes: list[Entry], held: dict[str, np.ndarray]
         if entry.name in held:
             base[entry.place] = held[entry.name]
     result = []
-    for values in itertools.product(*(e.param.starts for e in shapes)):
+    for chosen in itertools.product(*(e.param.starts for e in shapes)):
         node = base.copy()
-        for entry, value in zip(shapes, values, strict=True):
+        for entry, value in zip(shapes, chosen, strict=True):
             node[entry.place] = value
         result.append(node)
     return result
 
 
-@eqx.filter_jit
 def _solve_nodes(
-    model: AbstractBRDF, data: Data, s: Array, nodes: Float[Array, "k p"], weights: tuple[int, ...]
-) -> tuple[Float[Array, "k p"], Float[Array, " k"]]:
+    model: AbstractBRDF, data: Data, s: np.ndarray, nodes: Float[np.ndarray, "k p"], places: np.ndarray
+) -> tuple[Float[np.ndarray, "k p"], Float[np.ndarray, " k"]]:
     """For every node: the vector with its weights solved, and its cost in the transform of the likelihood."""
-    places = jnp.array(weights, int)
-    root_weight = jnp.sqrt(data.weight) / spread(data.x, data.noise, s)
+    dark = nodes.copy()
+    dark[:, places] = 0.0
+    lit = np.repeat(dark[:, None], 1 + len(places), axis=1)
+    lit[:, np.arange(1, 1 + len(places)), places] = 1.0
+    x = values(model, lit.reshape(-1, dark.shape[1]), data.wi, data.wo) * data.kappa
+    x = x.reshape(*lit.shape[:2], *data.x.shape)
+    offset, columns, predicted = x[:, 0], x[:, 1:] - x[:, :1], x[:, 0]
+    if len(places):
+        root = np.sqrt(data.weight) / spread(data.x, data.noise, s)
+        weighted = (columns * root).reshape(len(nodes), len(places), -1)
+        target = ((data.x - offset) * root).reshape(len(nodes), -1)
+        with np.errstate(all="ignore"):  # a node at which the model is not finite comes last
+            gram, moment = weighted @ weighted.transpose(0, 2, 1), np.einsum("kwn,kn->kw", weighted, target)
+            dark[:, places] = nonnegative(gram, moment)
+            predicted = offset + np.einsum("kw,kwnc->knc", dark[:, places], columns)
+    z = stabilised(data.x, data.noise, s) - stabilised(predicted, data.noise, s)
+    return dark, np.sum(data.weight * z**2, axis=(1, 2))
 
-    def value(p: Array) -> Array:
-        return evaluate_pairs(with_vector(model, p), data.wi, data.wo) * data.kappa
 
-    def one(node: Array) -> tuple[Array, Array]:
-        if weights:
-            dark = node.at[places].set(0.0)
-            offset = value(dark)
-            columns = jax.vmap(lambda k: value(dark.at[k].set(1.0)) - offset)(places)
-            columns = (columns * root_weight).reshape(len(weights), -1)
-            target = ((data.x - offset) * root_weight).ravel()
-            node = dark.at[places].set(nonnegative(columns @ columns.T, columns @ target))
-        z = stabilised(data.x, data.noise, s) - stabilised(value(node), data.noise, s)
-        return node, jnp.sum(data.weight * z**2)
-
-    return jax.vmap(one)(nodes)
-
-
-def nonnegative(gram: Float[Array, "k k"], moment: Float[Array, " k"]) -> Float[Array, " k"]:
+def nonnegative(gram: Float[np.ndarray, "... k k"], moment: Float[np.ndarray, "... k"]) -> Float[np.ndarray, "... k"]:
     """The w ≥ 0 that minimises ½wᵀGw − mᵀw, by cyclic coordinate descent (Franc, Hlaváč & Navara 2005).
 
     Descent crawls where columns are almost alike: in the end the weights that are not 0 are solved for at once, and
     that is taken where it is better.
 
     Args:
-        gram: G = AᵀA, (k, k).
-        moment: m = Aᵀb, (k,).
+        gram: G = AᵀA, (…, k, k).
+        moment: m = Aᵀb, (…, k).
     """
-    diagonal = jnp.diagonal(gram)
-    safe = jnp.where(diagonal > 0, diagonal, 1.0)
+    diagonal = np.diagonal(gram, axis1=-2, axis2=-1)
+    used = diagonal > 0
+    safe, w = np.where(used, diagonal, 1.0), np.zeros_like(moment)
+    for _ in range(SWEEPS):
+        before = w.copy()
+        for k in range(moment.shape[-1]):
+            best = w[..., k] + (moment[..., k] - np.sum(gram[..., k, :] * w, axis=-1)) / safe[..., k]
+            w[..., k] = np.where(used[..., k], np.maximum(best, 0.0), 0.0)
+        if not (np.abs(w - before) > STILL * np.abs(w)).any():
+            break
+    lit = np.asarray(w > 0)
+    among = lit[..., :, None] & lit[..., None, :]
+    with np.errstate(all="ignore"):
+        # A ridge at the level of rounding: of columns that are alike any solution is one.
+        ridge = np.where(w > 0, 4.0 * np.finfo(float).eps * diagonal, 1.0)
+        system = np.where(among, gram, 0.0) + ridge[..., None] * np.eye(w.shape[-1])
+        solvable = np.isfinite(system).all(axis=(-2, -1)) & np.isfinite(moment).all(axis=-1)
+        system = np.where(solvable[..., None, None], system, np.eye(w.shape[-1]))
+        solved = np.linalg.solve(system, np.where(w > 0, moment, 0.0)[..., None])[..., 0]
+        better = np.isfinite(solved).all(axis=-1) & (solved >= 0).all(axis=-1)
+        better &= _cost(gram, moment, solved) < _cost(gram, moment, w)
+    return np.where(better[..., None], solved, w)
 
-    def coordinate(k: int, w: Array) -> Array:
-        best = w[k] + (moment[k] - gram[k] @ w) / safe[k]
-        return w.at[k].set(jnp.where(diagonal[k] > 0, jnp.maximum(best, 0.0), 0.0))
 
-    def sweep(_: int, w: Array) -> Array:
-        return jax.lax.fori_loop(0, len(moment), coordinate, w)
-
-    crawled = jax.lax.fori_loop(0, SWEEPS, sweep, jnp.zeros_like(moment))
-    used = crawled > 0
-    among = jnp.where(used[:, None] & used, gram, jnp.eye(len(moment)))
-    solved = jnp.linalg.solve(among, jnp.where(used, moment, 0.0))
-
-    def cost(w: Array) -> Array:
-        return 0.5 * w @ gram @ w - moment @ w
-
-    better = jnp.isfinite(solved).all() & (solved >= 0).all() & (cost(solved) < cost(crawled))
-    return jnp.where(better, solved, crawled)
+def _cost(gram: np.ndarray, moment: np.ndarray, w: np.ndarray) -> np.ndarray:
+    return 0.5 * np.einsum("...i,...ij,...j->...", w, gram, w) - np.sum(moment * w, axis=-1)

@@ -9,14 +9,13 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple, TypeVar
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
 from fitmat._types import Progress
 from fitmat.fitting import fitting
 from fitmat.fitting.information import FOLLOWS, covariance, expected_information, is_positive, observed_information
-from fitmat.fitting.likelihood import NEGLIGIBLE, Data, noise_scale
+from fitmat.fitting.likelihood import NEGLIGIBLE, Data
 from fitmat.fitting.result import Fit, named_outcome
 from fitmat.fitting.streamed_sums import Sums, block_sums, blocks, prior_sums
 from fitmat.measurements.large.noise import Scatter, scatter
@@ -108,8 +107,8 @@ class _File(NamedTuple):
 
     def sums(self, best: AbstractBRDF, s: float, what: str) -> Sums:
         """The sums of all rows and of the prior."""
-        rows = self.added(lambda data: jax.device_get(block_sums(best, data, jnp.asarray(s))), what)
-        return jax.tree.map(np.add, rows, jax.device_get(prior_sums(best, self.start.data, jnp.asarray(s))))
+        rows = self.added(lambda data: block_sums(best, data, s), what)
+        return jax.tree.map(np.add, rows, prior_sums(best, self.start.data, s))
 
 
 class _Range:
@@ -125,7 +124,7 @@ class _Range:
     def __init__(self, start: Fit) -> None:
         self._start, self._moved, self._free = start, start.coordinates, start.free
         lower, upper = self._moved.low, self._moved.high
-        typical = float(noise_scale(start.data))
+        typical = float(start.data.typical)
         self.lower, self.upper = np.append(lower, 0.0), np.append(upper, np.inf)
         self.longest = np.append((upper - lower) / 4.0, max(typical, start.discrepancy))
         self.negligible = NEGLIGIBLE * typical
@@ -141,12 +140,12 @@ class _Range:
         """The model at x."""
         values = self._moved.filled(self._start.values, x[:-1])
         values[self._free] = np.clip(values[self._free], self._moved.lower, self._moved.upper)
-        return with_vector(self._start.model, jnp.asarray(values))
+        return with_vector(self._start.model, values)
 
     def second_order(self, n_valid: int) -> Float[np.ndarray, "p p"]:
         """What residuals × their curvature add to JᵀJ of so many values, estimated from the part; 0 if negligible."""
         start = self._start
-        first = np.asarray(expected_information(start.model, start.data, jnp.asarray(start.discrepancy)))
+        first = expected_information(start.model, start.data, start.discrepancy)
         return (start.information - first) * n_valid / start.measurements.n_valid
 
     def step(self, x: np.ndarray, sums: Sums, more: np.ndarray, damping: float) -> tuple[np.ndarray, float]:
@@ -216,10 +215,9 @@ def _concluded(file: _File, around: _Range, top: _Top) -> Fit:
     """The fit of the part with the numbers of all rows."""
     start, best, s = file.start, around.model(top.x), float(top.x[-1])
     information, free = np.asarray(top.sums.gram), start.free
-    if s >= FOLLOWS * float(noise_scale(start.data)):
-        at = jnp.asarray(s)
-        observed = file.added(lambda data: np.asarray(observed_information(best, data, at)), "curvature")
-        observed = observed + np.asarray(prior_sums(best, start.data, at).gram)
+    if s >= FOLLOWS * float(start.data.typical):
+        observed = file.added(lambda data: observed_information(best, data, s, information), "curvature")
+        observed = observed + prior_sums(best, start.data, s).gram
         information = observed if is_positive(observed[np.ix_(free, free)]) else information
     spread, undetermined = covariance(best, information, start.coordinates, start.data.told(free))
     on_bound = bool(start.coordinates.side(np.asarray(vector(best))).any())

@@ -5,15 +5,16 @@ It takes no step and reads no file.
 
 import dataclasses
 from collections.abc import Iterator
+from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike
 
 from fitmat.fitting.coordinates import coordinates
-from fitmat.fitting.likelihood import Data, discrepancy_cost, log_likelihood, prepare, prior_residuals, residuals
+from fitmat.fitting.likelihood import Data, log_likelihood, prepare, residuals
+from fitmat.maths.programs import program
 from fitmat.measurements.noise import Noise
 from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF
@@ -23,7 +24,7 @@ BLOCK = 2**15
 """Rows for which the program that adds up one block is compiled; its intermediate arrays stay in the cache."""
 
 
-class Sums(eqx.Module):
+class Sums(NamedTuple):
     """The cost −ln L of some rows and its derivatives; t are the natural coordinates of all p parameters.
 
     Attributes:
@@ -35,17 +36,22 @@ class Sums(eqx.Module):
         curvature: ∂²cost/∂s².
     """
 
-    cost: Float[Array, ""]
-    gradient: Float[Array, " p"]
-    gram: Float[Array, "p p"]
-    slope: Float[Array, ""]
-    mixed: Float[Array, " p"]
-    curvature: Float[Array, ""]
+    cost: Any
+    gradient: Any
+    gram: Any
+    slope: Any
+    mixed: Any
+    curvature: Any
 
 
-@eqx.filter_jit
-def block_sums(best: AbstractBRDF, data: Data, s: Array) -> Sums:
+def block_sums(best: AbstractBRDF, data: Data, s: float) -> Sums:
     """The sums of one block at `best` and s."""
+    return Sums(*(np.asarray(part) for part in _block_sums(best, data, np.asarray(s))))
+
+
+@program
+def _block_sums(best: AbstractBRDF, data: Data, s: ArrayLike) -> tuple[Array, ...]:
+    s = jnp.asarray(s)
     every, values = coordinates(best), vector(best)
     at = every.natural(values)
 
@@ -62,22 +68,18 @@ def block_sums(best: AbstractBRDF, data: Data, s: Array) -> Sums:
 
     (gradient, gram), (mixed, _) = jax.jvp(by_parameter, (s,), (jnp.ones_like(s),))
     (change, cost), (curvature, _) = jax.jvp(slope, (s,), (jnp.ones_like(s),))
-    return Sums(cost, gradient, gram, change, mixed, curvature)
+    return cost, gradient, gram, change, mixed, curvature
 
 
-def prior_sums(best: AbstractBRDF, data: Data, s: Array) -> Sums:
+def prior_sums(best: AbstractBRDF, data: Data, s: float) -> Sums:
     """The sums of what is known beforehand; all 0 where the prior is flat."""
-    every, values = coordinates(best), vector(best)
-    at = every.natural(values)
-
-    def apart(t: Array) -> Array:
-        return prior_residuals(every.model(best, values, t), data)
-
-    r, jacobian = apart(at), jax.jacfwd(apart)(at)
-    slope = jax.grad(discrepancy_cost, argnums=1)
-    change, curvature = jax.jvp(lambda s: slope(data, s), (s,), (jnp.ones_like(s),))
-    cost = 0.5 * jnp.vdot(r, r) + discrepancy_cost(data, s)
-    return Sums(cost, jacobian.T @ r, jacobian.T @ jacobian, change, 0.0 * at, curvature)
+    prior, nothing = data.prior, np.zeros(len(vector(best)))
+    if prior is None:
+        return Sums(0.0, nothing, np.diag(nothing), 0.0, nothing, 0.0)
+    precision, squared = np.asarray(prior.precision), float(prior.discrepancy) ** 2
+    r = precision * (coordinates(best).natural(vector(best)) - prior.mean)
+    cost = 0.5 * float(r @ r + squared * s**2)
+    return Sums(cost, precision * r, np.diag(precision**2), squared * s, nothing, squared)
 
 
 def blocks(chunk: Measurements, noise: Noise) -> Iterator[Data]:
@@ -87,5 +89,4 @@ def blocks(chunk: Measurements, noise: Noise) -> Iterator[Data]:
         data = prepare(chunk.rows(rows), dataclasses.replace(noise, sigma=noise.sigma[rows]))
         extra = ((0, BLOCK - len(data.x)), (0, 0))
         parts = (data.wi, data.wo, data.x, data.noise, data.kappa)
-        filled = [jnp.asarray(np.pad(np.asarray(part), extra, mode="edge")) for part in parts]
-        yield Data(*filled, weight=jnp.asarray(np.pad(np.asarray(data.weight), extra)))
+        yield Data(*(np.pad(part, extra, mode="edge") for part in parts), weight=np.pad(data.weight, extra))

@@ -10,7 +10,6 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Bool, Float, Int
 from scipy.stats import binomtest
@@ -23,7 +22,7 @@ from fitmat.fitting.likelihood import log_pointwise
 from fitmat.fitting.priors import DISCREPANCY, draw, prepare_prior
 from fitmat.fitting.result import Fit
 from fitmat.judgement.multiplicity import adjusted_for_many
-from fitmat.judgement.prediction import as_numpy, predictions, replicated
+from fitmat.judgement.prediction import predictions, replicated
 from fitmat.judgement.uniformity import p_values
 from fitmat.measurements.instrument import IDEAL
 from fitmat.measurements.samples import Measurements
@@ -181,7 +180,7 @@ def _centre(template: AbstractBRDF, priors: Priors) -> AbstractBRDF:
     for entry in entries(template):
         if entry.name in priors:
             values[entry.place] = priors[entry.name][0]
-    return with_vector(template, jnp.asarray(values))
+    return with_vector(template, values)
 
 
 def _quantities(template: AbstractBRDF) -> tuple[str, ...]:
@@ -200,7 +199,7 @@ def _placed(posterior: Posterior, truth: np.ndarray, s: float) -> tuple[np.ndarr
 
 
 def _log_likelihoods(fit: Fit, points: np.ndarray) -> Float[np.ndarray, " m"]:
-    data, found = as_numpy(fit.data), np.empty(len(points))
+    data, found = fit.data, np.empty(len(points))
     for part, x, noise, spread in predictions(fit, points[:, :-1], points[:, -1]):
         found[part] = (data.weight * log_pointwise(x, noise, data, spread)).sum(axis=(1, 2))
     return found

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.fitting.likelihood import log_pointwise
-from fitmat.judgement.prediction import as_numpy, predictions
+from fitmat.judgement.prediction import predictions
 from fitmat.uncertainty.posterior import GOOD_PARETO, Posterior
 
 LEFT_OUT_DRAWS = 1000
@@ -47,7 +47,7 @@ def weigh(posterior: Posterior) -> Evidence | None:
     if int(used.sum()) > MOST_LEFT_OUT or fit.n_values > MOST_LEFT_OUT:
         return None
     draws, s = posterior.thinned(LEFT_OUT_DRAWS)
-    data, logs = as_numpy(fit.data), np.empty((len(s), int(used.sum())))
+    data, logs = fit.data, np.empty((len(s), int(used.sum())))
     for part, x, noise, spread in predictions(fit, draws, s):
         logs[part] = log_pointwise(x, noise, data, spread)[:, used]
     d = posterior.diagnostics

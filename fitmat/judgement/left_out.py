@@ -5,24 +5,18 @@ It says nothing of which model is better; `choice` does. A large file is not ref
 
 import dataclasses
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.fitting.fitting import refine
-from fitmat.fitting.likelihood import first_discrepancy, misfits
+from fitmat.fitting.fitting import optima
+from fitmat.fitting.likelihood import misfits
 from fitmat.fitting.result import Fit
-from fitmat.judgement.prediction import as_numpy, predictions
+from fitmat.judgement.prediction import predictions
 from fitmat.measurements.incidences import incidences
 from fitmat.models.metrics import cube_root
 
 MOST_REFITTED = 50_000
 """Values above which nothing is refitted."""
-
-MAX_STEPS = 256
-"""Iterations of each refit, as many as `fitting.fit` allows, so that its compiled program serves."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -93,21 +87,17 @@ def leave_incidences_out(fit: Fit) -> LeftOut | None:
 
 def _refitted(fit: Fit, weights: Float[np.ndarray, "k n c"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Parameters (k, p), s and convergence of the fits under other weights."""
-    starts = jnp.asarray(np.tile(fit.values, (fit.n_starts, 1)))
-    first = first_discrepancy(fit.data)
-    found = []
-    for weight in weights:
-        data = eqx.tree_at(lambda d: d.weight, fit.data, jnp.asarray(weight))
-        ends = jax.device_get(refine(fit.model, data, starts, first, fit.coordinates, MAX_STEPS))
-        best = int(np.argmax(np.nan_to_num(ends.log_likelihood, nan=-np.inf)))
-        found.append((ends.values[best], ends.discrepancy[best], ends.solved[best]))
-    values, s, settled = (np.array(column) for column in zip(*found, strict=True))
+    ends = [
+        optima(fit.model, dataclasses.replace(fit.data, weight=weight), fit.values[None], fit.coordinates)
+        for weight in weights
+    ]
+    values, s, _, settled, _ = (np.concatenate(column) for column in zip(*ends, strict=True))
     return values, s, settled
 
 
 def _errors(fit: Fit, draws: np.ndarray, s: np.ndarray, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Root mean squares, over what each was not fitted to, of the cube-root error and of the residual, (k,) each."""
-    data, found = as_numpy(fit.data), np.empty((2, len(draws)))
+    data, found = fit.data, np.empty((2, len(draws)))
     for part, x, noise, spread in predictions(fit, draws, s):
         squares = (cube_root(data.x) - cube_root(x)) ** 2, misfits(x, noise, data, spread) ** 2
         found[:, part] = [(left[part] * square).sum(axis=(1, 2)) for square in squares]

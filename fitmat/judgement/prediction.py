@@ -6,19 +6,19 @@ Gives arrays; draws nothing.
 import dataclasses
 from collections.abc import Iterator
 
-import jax
 import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtri
 
-from fitmat.fitting.likelihood import Data, misfits
+from fitmat.fitting.likelihood import misfits
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.result import Fit
 from fitmat.fitting.stabilising import from_stabilised, stabilised
 from fitmat.maths.directions import from_angles
 from fitmat.measurements.samples import Measurements
 from fitmat.models.around.noise import Noisy
-from fitmat.models.values import at, drawn, slices, values
+from fitmat.models.parameters import with_vector
+from fitmat.models.values import at, slices, values
 from fitmat.uncertainty.posterior import Posterior
 
 BAND_DRAWS = 200
@@ -76,10 +76,9 @@ def standardised_residuals(fit: Fit, *, misfit: bool = True) -> Float[np.ndarray
         fit: Under any loss: the transform is the default's, so that all are comparable.
         misfit: Whether the misfit counts; else in standard deviations of the noise alone.
     """
-    data = as_numpy(fit.data.under(DEFAULT))
-    wi, wo, kappa = (np.asarray(part) for part in (data.wi, data.wo, data.kappa))
+    data = fit.data.under(DEFAULT)
     s = np.asarray(fit.misfit if misfit else 0.0)
-    return misfits(at(fit.model, wi, wo) * kappa, data.noise, data, s)
+    return misfits(at(fit.model, data.wi, data.wo) * data.kappa, data.noise, data, s)
 
 
 def predictive_band(posterior: Posterior, rows: np.ndarray) -> Float[np.ndarray, "2 k c"]:
@@ -126,16 +125,10 @@ def predictions(
     Yields:
         Which draws, f κ and σ κ, (k, n, c) each or (n, c) where the noise is given, and s as (k, 1, 1).
     """
-    data = as_numpy(fit.data)
-    wi, wo, kappa = (np.asarray(part) for part in (data.wi, data.wo, data.kappa))
+    data = fit.data
     for part in slices(len(draws), max(1, MOST_NUMBERS // data.x.size)):
-        x, noise = values(fit.model, draws[part], wi, wo) * kappa, np.asarray(data.noise)
+        x, noise = values(fit.model, draws[part], data.wi, data.wo) * data.kappa, data.noise
         if isinstance(fit.model, Noisy):
             assert data.level is not None
-            noise = kappa * np.stack([drawn(fit.model, draw).sigma(data.level) for draw in draws[part]])
+            noise = data.kappa * np.stack([with_vector(fit.model, draw).sigma(data.level) for draw in draws[part]])
         yield part, x, noise, s[part, None, None]
-
-
-def as_numpy(data: Data) -> Data:
-    """The same with NumPy arrays, on which the formulas of `likelihood` need no compiled program."""
-    return jax.tree.map(np.asarray, data)

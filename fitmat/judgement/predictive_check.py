@@ -13,7 +13,7 @@ from fitmat.fitting.likelihood import misfits
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.result import Fit
 from fitmat.judgement.multiplicity import adjusted_for_many
-from fitmat.judgement.prediction import as_numpy, predictions
+from fitmat.judgement.prediction import predictions
 from fitmat.judgement.predictive_statistics import Replicates, Statistic
 from fitmat.measurements.incidences import incidences
 from fitmat.text import html_table, text_table
@@ -134,7 +134,7 @@ def _seen(
     fit: Fit, draws: np.ndarray, s: np.ndarray, top: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Residuals, ln P(y_rep ≤ top), model f κ and noise of every draw, (d, n, c) each."""
-    data, found = as_numpy(fit.data), np.empty((4, len(draws), *fit.data.x.shape))
+    data, found = fit.data, np.empty((4, len(draws), *fit.data.x.shape))
     for part, x, noise, spread in predictions(fit, draws, s):
         at, above = (data.loss.transform(f, noise, data.kappa, spread) for f in (x, top[:, None] * data.kappa))
         found[0, part] = misfits(x, noise, data, spread)

@@ -6,12 +6,12 @@ No measurement takes part: the rows are directions of a quadrature and the value
 import dataclasses
 import itertools
 from collections.abc import Mapping
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jaxtyping import Array, ArrayLike, Float
 
 from fitmat.errors import FitmatError
@@ -23,13 +23,15 @@ from fitmat.fitting.starts import nonnegative
 from fitmat.match.distances import AZIMUTHS, direction_weight, incidence_weight
 from fitmat.match.regions import incidence_panels
 from fitmat.maths.least_squares import least_squares
-from fitmat.maths.quadrature import Rule, lobe_rule
+from fitmat.maths.programs import program
+from fitmat.maths.quadrature import lobe_rule
 from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.conversion import exponent_from_alpha
 from fitmat.models.metrics import METRICS
 from fitmat.models.parameters import check_range, entries, vector, with_vector
 from fitmat.models.registry import model
+from fitmat.models.values import at, values, widths
 
 LEAST_SQUARES = tuple(name for name, metric in METRICS.items() if metric.kind != "light")
 """Metrics that are sums of squares, and can be minimised as such."""
@@ -107,14 +109,14 @@ def imitate(
         raise FitmatError(f"metric {metric!r}: expected one of {', '.join(LEAST_SQUARES)}.")
     source = surface(what.model if isinstance(what, Fit) else what)
     template, moved = _template(source, into, dict(fixed or {}))
-    nodes = _nodes(template, moved.index, float(source.width()))
-    index = jnp.asarray(LEAST_SQUARES.index(metric))
-    found = _solve(source, template, jnp.asarray(nodes), index, moved)
-    values, square, converged = (np.asarray(part) for part in found)
+    rows = _rows(source, metric)
+    nodes = _nodes(template, moved.index, float(widths(source, vector(source)[None])[0]))
+    found = _solve(template, rows, _started(template, nodes, moved, rows, metric), moved)
+    ends, square, converged = (np.asarray(part) for part in found)
     best = int(np.argmin(np.nan_to_num(square, nan=np.inf)))
     mean_square = METRICS[metric].kind == "mean square"
     distance = 2.0 / np.pi * square[best] if mean_square else np.sqrt(square[best])
-    chosen = with_vector(template, jnp.asarray(values[best]))
+    chosen = with_vector(template, ends[best])
     return Imitation(chosen, source.name, metric, float(distance), bool(converged[best]))
 
 
@@ -122,15 +124,15 @@ def _template(
     source: AbstractBRDF, into: str | AbstractBRDF, held: dict[str, ArrayLike]
 ) -> tuple[AbstractBRDF, Coordinates]:
     """The imitating model with what is held at its value, and the coordinates of the rest."""
-    up = jnp.array([0.0, 0.0, 1.0])
-    channels = jax.eval_shape(lambda: jnp.atleast_1d(source(up, up))).size
+    up = np.array([[0.0, 0.0, 1.0]])
+    channels = at(source, up, up).shape[1]
     template = surface(model(into, channels=channels) if isinstance(into, str) else into)
-    values, places = np.array(vector(template)), {e.name: e.place for e in entries(template)}
+    numbers, places = np.array(vector(template)), {e.name: e.place for e in entries(template)}
     for name, value in held.items():
         if name not in places:
             raise FitmatError(f"cannot fix {name!r}: {template.name} has {', '.join(places)}.")
-        values[places[name]] = value
-    template = with_vector(template, jnp.asarray(values))
+        numbers[places[name]] = value
+    template = with_vector(template, numbers)
     check_range(template)
     return template, coordinates(template, held)
 
@@ -146,106 +148,96 @@ def _nodes(template: AbstractBRDF, free: np.ndarray, width: float) -> Float[np.n
         near = [width * w if slope else exponent_from_alpha(min(width * w, 0.99)) for w in WIDER]
         grid.append([np.clip(x, entry.param.lower, entry.param.upper) for x in (near if slope or power else own)])
     nodes = []
-    for values in itertools.islice(itertools.product(*grid), MOST_NODES):
+    for chosen in itertools.islice(itertools.product(*grid), MOST_NODES):
         node = base.copy()
-        for entry, value in zip(shapes, values, strict=True):
+        for entry, value in zip(shapes, chosen, strict=True):
             node[entry.place] = value
         nodes.append(node)
     return np.array(nodes)
 
 
-@eqx.filter_jit
-def _solve(
-    source: AbstractBRDF, template: AbstractBRDF, nodes: Float[Array, "k p"], metric: Array, moved: Coordinates
-) -> tuple[Float[Array, "e p"], Float[Array, " e"], Array]:
-    """The ends of the best starts: parameters, T/V, and whether the solver was content; `metric` is traced."""
-    rows = _rows(source, metric)
-    weights = [
-        k for e in entries(template) if e.param.weight for k in range(e.place.start, e.place.stop) if k in moved.places
-    ]
-
-    def residual(u: Array, base: Array) -> Array:
-        return rows.residual(with_vector(template, moved.from_unbounded(base, u)))
-
-    def started(node: Array) -> tuple[Array, Array]:
-        start = _weighted(template, node, jnp.array(weights, int), rows) if weights else node
-        return start, jnp.sum(rows.residual(with_vector(template, start)) ** 2)
-
-    starts, cost = jax.lax.map(started, nodes)
-    first = starts[jnp.argsort(cost)[:REFINED]]
-
-    def refined(base: Array) -> tuple[Array, Array, Array]:
-        end = least_squares(residual, moved.unbounded(base), base)
-        best = with_vector(template, moved.from_unbounded(base, end.x))
-        solved = (end.result == optx.RESULTS.successful) | (end.offset < STEADY)
-        return vector(best), jnp.sum(rows.residual(best) ** 2), solved
-
-    return mapped(refined, first)
-
-
 class Target(eqx.Module):
-    """Pairs of directions with what is imitated there.
+    """Pairs of directions with what is imitated there, in NumPy's arrays outside of programs.
 
     Attributes:
         wi: Directions to the light, (n, 3).
         wo: Directions to the sensor, (n, 3).
         root: √(w/V), (n, 1): the sum of squares of the residuals is T/V.
-        target: t of the imitated model, (n, c).
-        slope: dt/df there, (n, c).
         value: f of the imitated model, (n, c).
         metric: Place in `LEAST_SQUARES`, traced.
     """
 
-    wi: Float[Array, "n 3"]
-    wo: Float[Array, "n 3"]
-    root: Float[Array, "n 1"]
-    target: Float[Array, "n c"]
-    slope: Float[Array, "n c"]
-    value: Float[Array, "n c"]
-    metric: Array
-
-    def residual(self, imitating: AbstractBRDF) -> Float[Array, "n c"]:
-        """√(w/V) (t(f) − t(f_2))."""
-        f = evaluate_pairs(imitating, self.wi, self.wo)
-        return self.root * (_transformed(self.metric, f, self.wi, self.wo) - self.target)
+    wi: Any
+    wo: Any
+    root: Any
+    value: Any
+    metric: Any
 
 
-def _transformed(metric: Array, f: Array, wi: Array, wo: Array) -> Array:
-    branches = [lambda f, k=name: METRICS[k].transform(f, wi[:, 2:], wo[:, 2:]) for name in LEAST_SQUARES]
-    return jax.lax.switch(metric, branches, f)
+def _started(
+    template: AbstractBRDF, nodes: Float[np.ndarray, "k p"], moved: Coordinates, rows: Target, metric: str
+) -> Float[np.ndarray, "e p"]:
+    """The `REFINED` best nodes with their weights solved, the transform taken as straight about the imitated values."""
+    free = set(moved.places)
+    places = np.array(
+        [k for e in entries(template) if e.param.weight for k in range(e.place.start, e.place.stop) if k in free], int
+    )
+    cosines, transform = (rows.wi[:, 2:], rows.wo[:, 2:]), METRICS[metric].transform
+    target, step = transform(rows.value, *cosines), 1e-6 * np.abs(rows.value) + 1e-12
+    slope = (transform(rows.value + step, *cosines) - transform(rows.value - step, *cosines)) / (2.0 * step)
+    upper, solved, cost = np.array(coordinates(template).upper)[places], [], []
+    for node in nodes:
+        lit = np.tile(node, (1 + len(places), 1))
+        lit[:, places] = 0.0
+        lit[np.arange(1, len(lit)), places] = 1.0
+        f = values(template, lit, rows.wi, rows.wo)
+        offset, scale = f[0], rows.root * slope
+        columns = ((f[1:] - offset) * scale).reshape(len(places), -1)
+        start = lit[0]
+        if len(places):
+            weights = nonnegative(columns @ columns.T, columns @ ((rows.value - offset) * scale).ravel())
+            start[places] = np.minimum(weights, upper)
+        found = offset + np.tensordot(start[places], f[1:] - offset, 1)
+        solved.append(start if len(places) else node)
+        cost.append(np.sum((rows.root * (transform(found, *cosines) - target)) ** 2))
+    return np.array(solved)[np.argsort(np.nan_to_num(cost, nan=np.inf), kind="stable")[:REFINED]]
 
 
-def _rows(source: AbstractBRDF, metric: Array) -> Target:
+@program
+def _solve(
+    template: AbstractBRDF, rows: Target, starts: ArrayLike, moved: Coordinates
+) -> tuple[Float[Array, "e p"], Float[Array, " e"], Array]:
+    """The ends of the starts: parameters, T/V, and whether the solver was content."""
+
+    def transformed(f: Array) -> Array:
+        cosines = rows.wi[:, 2:], rows.wo[:, 2:]
+        branches = [lambda f, k=name: METRICS[k].transform(f, *cosines) for name in LEAST_SQUARES]
+        return jax.lax.switch(rows.metric, branches, f)
+
+    target = transformed(rows.value)
+
+    def residual(u: Array, base: Array) -> Array:
+        f = evaluate_pairs(with_vector(template, moved.from_unbounded(base, u)), rows.wi, rows.wo)
+        return rows.root * (transformed(f) - target)
+
+    def refined(base: Array) -> tuple[Array, Array, Array]:
+        end = least_squares(residual, moved.unbounded(base), base)
+        return moved.from_unbounded(base, end.x), end.square, end.solved | (end.offset < STEADY)
+
+    return mapped(refined, jnp.asarray(starts))
+
+
+def _rows(source: AbstractBRDF, metric: str) -> Target:
     """The quadrature, dense where the imitated lobe is."""
     theta, solid = incidence_panels()
-    turns = jnp.zeros(1) if source.isotropic else (jnp.arange(AZIMUTHS) + 0.5) * jnp.pi / AZIMUTHS
-    place = jnp.stack([jnp.repeat(turns, len(theta)), jnp.tile(jnp.asarray(theta), len(turns))], axis=1)
-
-    def at(turn: Array, angle: Array) -> Rule:
-        return lobe_rule(angle, source.width(), phi_i=None if source.isotropic else turn, nodes=NODES)
-
-    rules = jax.vmap(at)(*place.T)
-    wi = jnp.broadcast_to(rules.wi[:, None], rules.wo.shape).reshape(-1, 3)
-    wo = rules.wo.reshape(-1, 3)
-    f = evaluate_pairs(source, wi, wo)
-    of_light = jnp.asarray([incidence_weight(METRICS[name], theta, solid) for name in LEAST_SQUARES])
-    of_sensor = jnp.stack([jax.vmap(lambda r, k=k: direction_weight(METRICS[k], r))(rules) for k in LEAST_SQUARES])
-    weight = (jnp.tile(of_light, len(turns))[..., None] * of_sensor).reshape(len(LEAST_SQUARES), -1)[metric]
-    relative = jnp.asarray([METRICS[name].kind == "relative" for name in LEAST_SQUARES])[metric]
-    norm = weight @ jnp.where(relative, (f**2).mean(axis=1), 1.0)
-    target, slope = jax.jvp(lambda f: _transformed(metric, f, wi, wo), (f,), (jnp.ones_like(f),))
-    return Target(wi, wo, jnp.sqrt(weight / norm / f.shape[1])[:, None], target, slope, f, metric)
-
-
-def _weighted(template: AbstractBRDF, node: Array, places: Array, rows: Target) -> Array:
-    """The node with its weights solved, the transform taken as straight about the imitated values."""
-
-    def value(p: Array) -> Array:
-        return evaluate_pairs(with_vector(template, p), rows.wi, rows.wo)
-
-    dark = node.at[places].set(0.0)
-    offset, scale = value(dark), rows.root * rows.slope
-    columns = jax.lax.map(lambda k: ((value(dark.at[k].set(1.0)) - offset) * scale).ravel(), places)
-    target = ((rows.value - offset) * scale).ravel()
-    limit = jnp.asarray(coordinates(template).upper)[places]
-    return dark.at[places].set(jnp.minimum(nonnegative(columns @ columns.T, columns @ target), limit))
+    width = float(widths(source, vector(source)[None])[0])
+    turns = [None] if source.isotropic else ((np.arange(AZIMUTHS) + 0.5) * np.pi / AZIMUTHS).tolist()
+    rules = [lobe_rule(angle, width, phi_i=turn, nodes=NODES) for turn in turns for angle in theta]
+    wi = np.concatenate([np.broadcast_to(rule.wi, rule.wo.shape) for rule in rules])
+    wo = np.concatenate([rule.wo for rule in rules])
+    f, of_light = at(source, wi, wo), np.tile(incidence_weight(METRICS[metric], theta, solid), len(turns))
+    of_sensor = [direction_weight(METRICS[metric], rule) for rule in rules]
+    weight = np.concatenate([light * part for light, part in zip(of_light, of_sensor, strict=True)])
+    norm = weight @ ((f**2).mean(axis=1) if METRICS[metric].kind == "relative" else np.ones(len(f)))
+    root = np.sqrt(weight / norm / f.shape[1])[:, None]
+    return Target(wi, wo, root, f, np.array(LEAST_SQUARES.index(metric)))

@@ -1,17 +1,16 @@
-"""The least-squares core: Levenberg–Marquardt from Optimistix's parts, in units of the problem's own.
+"""The least-squares core: Levenberg–Marquardt by the normal equations, as a solver of Optimistix, in units of its own.
 
-Knows no model, no bounds and no noise.
+Each step looks at all residuals once. Knows no model, no bounds and no noise.
 """
 
-import functools
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optimistix as optx
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 RTOL = 1e-8
 """Relative tolerance of the steps in units of each parameter's own scale, SciPy's default; convergence is quadratic."""
@@ -19,15 +18,26 @@ RTOL = 1e-8
 FIRST_DAMPING = 1e-3
 """The first λ relative to the diagonal of JᵀJ: starts from a grid are close, and a bad step is taken back."""
 
-TALL = 20_000
-"""From this many residuals on, JᵀJ is formed instead of a QR factorisation of J."""
+GOOD, BAD = 0.75, 0.01
+"""Gains, relative to what the linear model promised, from which λ falls, and below which a step is taken back."""
+
+FALL, RISE = 0.1, 4.0
+"""What λ is multiplied with after a good step, and after one that was taken back."""
+
+ROUNDING = 1e-15
+"""λ is at least this fraction of the largest eigenvalue of JᵀJ, roughly: its factor stays finite."""
 
 
-class Units(eqx.Module):
-    """In what a problem is measured: `x` for each parameter, `residual` for all residuals together."""
+class Normal(NamedTuple):
+    """What a Gauss–Newton step needs of all residuals: Σ r², Jᵀr and JᵀJ."""
 
-    x: Float[Array, " p"]
-    residual: Float[Array, ""]
+    square: Float[Array, ""]
+    slope: Float[Array, " p"]
+    gram: Float[Array, "p p"]
+
+    def __add__(self, other: "Normal") -> "Normal":  # type: ignore[override]
+        """Of both sets of residuals together."""
+        return Normal(self.square + other.square, self.slope + other.slope, self.gram + other.gram)
 
 
 class Minimum(eqx.Module):
@@ -35,59 +45,125 @@ class Minimum(eqx.Module):
 
     Attributes:
         x: Parameters, (p,).
-        result: An `optimistix.RESULTS` member.
+        square: Σ residual² there.
+        solved: Whether the steps became small before they ran out.
         steps: Iterations used.
-        units: The problem's units, to reuse for a similar problem.
+        damping: λ at the end, relative to the diagonal of JᵀJ at the start; to go on from here.
         offset: Relative offset of Bates & Watts (1981): the next Gauss–Newton step in units of the standard errors.
     """
 
     x: Float[Array, " p"]
-    result: optx.RESULTS
+    square: Float[Array, ""]
+    solved: Bool[Array, ""]
     steps: Int[Array, ""]
+    damping: Float[Array, ""]
     offset: Float[Array, ""]
-    units: Units
 
 
-class TrustRegion(optx.AbstractSearch):
-    """The classical trust region (Conn, Gould & Toint 2000, alg. 6.1.1) with an eye for rounding.
+def normal_equations(residual: Callable[[Float[Array, " p"]], Array], x: Float[Array, " p"]) -> Normal:
+    """Of the residuals of any shape at x."""
 
-    Optimistix's own grows only where the quadratic model is right to 1 %, and takes the last steps, whose gain is lost
-    in rounding, for failures; together that doubles the iterations here.
+    def flat(at: Array) -> Array:
+        return jnp.ravel(residual(at))
+
+    r, columns = jax.vmap(lambda e: jax.jvp(flat, (x,), (e,)), out_axes=(None, 0))(jnp.eye(len(x)))
+    return Normal(r @ r, columns @ r, columns @ columns.T)
+
+
+class _State(eqx.Module):
+    """Where an iteration stands.
+
+    Attributes:
+        trial: The point to look at next.
+        here: Of the point that the iteration stands at.
+        promised: By how much ½ Σ r² falls at `trial` where the residuals are linear.
+        damping: λ in the scaled units.
+        scale: Unit of each parameter.
+        steps: Points looked at.
+        settled: Whether the last step was small.
     """
 
-    good: float = 0.75
-    bad: float = 0.01
-    grow: float = 10.0
-    shrink: float = 0.25
-
-    def init(self, y: Any, f_info_struct: Any) -> Array:
-        """The first step size; λ is its inverse."""
-        del y, f_info_struct
-        return jnp.array(1.0)
-
-    def step(
-        self, first_step: Array, y: Any, y_eval: Any, f_info: Any, f_eval_info: Any, state: Array
-    ) -> tuple[Array, Array, optx.RESULTS, Array]:
-        """New step size, whether `y_eval` is accepted, outcome, state."""
-        before, after = f_info.as_min(), f_eval_info.as_min()
-        linear = f_info.jac.mv(y_eval - y) + f_info.residual
-        gain, expected = before - after, before - 0.5 * (linear @ linear)
-        rounding = 16.0 * jnp.finfo(before.dtype).eps * before
-        accept = first_step | (gain >= self.bad * expected - rounding)
-        grows = ~first_step & (gain >= self.good * expected - rounding)
-        size = state * jnp.where(accept, jnp.where(grows, self.grow, 1.0), self.shrink)
-        return size, accept, optx.RESULTS.successful, size
+    trial: Array
+    here: Normal
+    promised: Array
+    damping: Array
+    scale: Array
+    steps: Array
+    settled: Array
 
 
-class LevenbergMarquardt(optx.AbstractGaussNewton):
-    """Optimistix's Gauss–Newton iteration with its damped Newton descent, in `TrustRegion`."""
+class LevenbergMarquardt(optx.AbstractLeastSquaresSolver):
+    """Levenberg 1944, Marquardt 1963, with an eye for rounding.
+
+    The function returns ‖r‖ and, as its aux, `Normal`. Each parameter is measured in units of the inverse norm of its
+    column of the Jacobian at the start (Moré 1978), the residuals in units of their norm, so that one first damping
+    suits any problem. The last steps, whose gain is lost in rounding, count as successes.
+    """
 
     rtol: float
     atol: float
+    limit: Any
+    damping: Any = 1.0
     norm: Callable[[Any], Any] = optx.max_norm
-    descent: optx.AbstractDescent = eqx.field(default_factory=optx.DampedNewtonDescent)
-    search: optx.AbstractSearch = eqx.field(default_factory=TrustRegion)
-    verbose: Callable[..., None] = eqx.field(static=True, default=lambda **_: None)
+
+    def init(self, fn: Any, y: Array, args: Any, options: Any, f_struct: Any, aux_struct: Any, tags: Any) -> _State:
+        """Nothing is looked at."""
+        del fn, args, options, f_struct, tags
+        nothing = jax.tree.map(lambda part: jnp.full(part.shape, jnp.inf, part.dtype), aux_struct)
+        damping = jnp.asarray(self.damping, y.dtype)
+        return _State(y, nothing, jnp.zeros(()), damping, jnp.ones_like(y), jnp.array(0), jnp.array(False))
+
+    def step(
+        self, fn: Any, y: Array, args: Any, options: Any, state: _State, tags: Any
+    ) -> tuple[Array, _State, Normal]:
+        """Look at the trial point, go there or not, and choose the next."""
+        del options, tags
+        there: Normal = fn(state.trial, args)[1]
+        first = state.steps == 0
+        lengths = jnp.sqrt(jnp.diagonal(there.gram) * FIRST_DAMPING)
+        first_unit = jnp.sqrt(there.square)
+        natural = jnp.where(lengths > 0, first_unit / jnp.where(lengths > 0, lengths, 1.0), 1.0)
+        scale = jnp.where(first, jnp.where(first_unit > 0, natural, 1.0), state.scale)
+        before, after = 0.5 * state.here.square, 0.5 * there.square
+        gain = before - after
+        rounding = 16.0 * jnp.finfo(y.dtype).eps * before
+        accept = first | (gain >= BAD * state.promised - rounding)
+        grows = ~first & (gain >= GOOD * state.promised - rounding)
+        damping = state.damping * jnp.where(accept, jnp.where(grows, FALL, 1.0), RISE)
+        new_y = jnp.where(accept, state.trial, y)
+        here = jax.tree.map(lambda new, old: jnp.where(accept, new, old), there, state.here)
+        moved, size = jnp.abs(state.trial - y) / scale, jnp.abs(y) / scale
+        small = jnp.all(moved <= self.atol + self.rtol * size)
+        same = jnp.abs(gain) <= self.atol * 0.5 * here.square + self.rtol * before
+        settled = ~first & accept & small & same
+        step, promised = _ahead(here, scale, damping)
+        return new_y, _State(new_y + step, here, promised, damping, scale, state.steps + 1, settled), here
+
+    def terminate(
+        self, fn: Any, y: Array, args: Any, options: Any, state: _State, tags: Any
+    ) -> tuple[Bool[Array, ""], optx.RESULTS]:
+        """Where the last step was small, the steps ran out, or there is nothing finite to start from."""
+        del fn, y, args, options, tags
+        lost = (state.steps > 0) & ~jnp.isfinite(state.here.square)
+        outcome = optx.RESULTS.where(lost, optx.RESULTS.nonfinite, optx.RESULTS.successful)
+        return state.settled | (state.steps >= self.limit) | lost, outcome
+
+    def postprocess(
+        self, fn: Any, y: Array, aux: Any, args: Any, options: Any, state: _State, tags: Any, result: optx.RESULTS
+    ) -> tuple[Array, Any, dict[str, Any]]:
+        """The iterate as it is."""
+        del fn, args, options, state, tags, result
+        return y, aux, {}
+
+
+def _ahead(here: Normal, scale: Array, damping: Array) -> tuple[Array, Array]:
+    """The damped step from a point, and by how much ½ Σ r² falls there where the residuals are linear."""
+    unit = jnp.where(here.square > 0, here.square, 1.0)
+    slope, gram = here.slope * scale / unit, here.gram * scale[:, None] * scale / unit
+    least = ROUNDING * jnp.trace(gram)
+    factor = jnp.linalg.cholesky(gram + (damping + least) * jnp.eye(len(scale)))
+    step = -jax.scipy.linalg.cho_solve((factor, True), slope)
+    return step * scale, -unit * (slope @ step + 0.5 * step @ gram @ step)
 
 
 def least_squares(
@@ -96,84 +172,45 @@ def least_squares(
     args: Any = None,
     *,
     tolerance: float = RTOL,
-    max_steps: int = 256,
-    units: Units | None = None,
+    max_steps: Any = 256,
+    damping: Any = 1.0,
 ) -> Minimum:
     """Minimise ½Σ residual² from x0.
-
-    Each parameter is measured in units of the inverse norm of its column of the Jacobian at x0 and the residuals in
-    units of their norm there (Marquardt 1963, Moré 1978), so that one first damping suits any problem.
 
     Args:
         residual: `residual(x, args)`, any shape.
         x0: Start, (p,).
         args: Passed on.
         tolerance: Both the relative and the absolute tolerance in the scaled units.
-        max_steps: Iterations before giving up.
-        units: Those of a similar problem, which saves one look at all residuals.
+        max_steps: Looks at all residuals before giving up.
+        damping: The first λ, relative to `FIRST_DAMPING`; smaller where the start is known to be close.
 
     Returns:
         The last iterate and how the solve ended; never raises for numerical reasons.
     """
-    # Jitted, so that the several places of the solver's program that need it trace it once.
-    point = jax.jit(functools.partial(_compressed_point, residual))
-    if units is None:
-        units = _natural_units(*point(x0, args))
-    small, by = _compressed(point), units
-    solver = LevenbergMarquardt(rtol=tolerance, atol=tolerance)
-    solution = optx.least_squares(
-        lambda u, a: small(u * by.x, a) / by.residual, solver, x0 / by.x, args, max_steps=max_steps, throw=False
-    )
-    last = solution.state.f_info.residual
+
+    def point(x: Array, args: Any) -> tuple[Array, Normal]:
+        found = normal_equations(lambda at: residual(at, args), x)
+        return jnp.sqrt(found.square), found
+
+    solver = LevenbergMarquardt(rtol=tolerance, atol=tolerance, limit=max_steps, damping=damping)
+    solution = optx.least_squares(point, solver, x0, args, has_aux=True, max_steps=None, throw=False)
+    state = solution.state
     freedom = jax.eval_shape(residual, x0, args).size / max(len(x0), 1) - 1.0
-    offset = jnp.sqrt(freedom * (last[:-1] @ last[:-1])) / jnp.maximum(last[-1], jnp.finfo(last.dtype).tiny)
-    return Minimum(solution.value * by.x, solution.result, solution.stats["num_steps"], offset, units)
+    offset = relative_offset(state.here, freedom)
+    return Minimum(solution.value, state.here.square, state.settled, state.steps, state.damping, offset)
 
 
-def _natural_units(value: Float[Array, " p+1"], triangle: Float[Array, "p p"]) -> Units:
-    """Columns of the Jacobian of the length that makes λ = 1 the first damping, and residuals of norm 1."""
-    norm = jnp.sqrt(value @ value)
-    unit = jnp.where(norm > 0, norm, 1.0)
-    lengths = jnp.sqrt(jnp.sum(triangle**2, axis=0) * FIRST_DAMPING)
-    return Units(jnp.where(lengths > 0, unit / jnp.where(lengths > 0, lengths, 1.0), 1.0), unit)
+def relative_offset(here: Normal, freedom: float) -> Float[Array, ""]:
+    """Length of the Gauss–Newton step in units of the standard errors: √(‖Qᵀr‖²/p ÷ (‖r‖² − ‖Qᵀr‖²)/(n − p)).
 
-
-def _compressed_point(
-    residual: Callable[[Array, Any], Array], x: Array, args: Any
-) -> tuple[Float[Array, " p+1"], Float[Array, "p p"]]:
-    """What a least-squares step needs of all residuals: Qᵀr with what r has outside of Q, and R, where J = QR."""
-
-    def flat(at: Array) -> Array:
-        return jnp.ravel(residual(at, args))
-
-    r, columns = jax.vmap(lambda e: jax.jvp(flat, (x,), (e,)), out_axes=(None, 0))(jnp.eye(len(x)))
-    if r.size >= TALL:
-        gram = columns @ columns.T
-        # A ridge at the level of rounding keeps the factor finite where parameters act alike.
-        ridge = jnp.finfo(gram.dtype).eps * r.size**0.5 * jnp.diagonal(gram) + jnp.finfo(gram.dtype).tiny
-        triangle = jnp.linalg.cholesky(gram + jnp.diag(ridge)).T
-        inside = jax.scipy.linalg.solve_triangular(triangle, columns @ r, trans=1)
-    else:
-        q, triangle = jnp.linalg.qr(columns.T)
-        flip = jnp.where(jnp.diagonal(triangle) < 0, -1.0, 1.0)
-        inside, triangle = flip * (q.T @ r), flip[:, None] * triangle
-    outside = jnp.sqrt(jnp.maximum(jnp.vdot(r, r) - inside @ inside, 0.0))
-    return jnp.append(inside, outside), triangle
-
-
-def _compressed(point: Callable[[Array, Any], tuple[Array, Array]]) -> Callable[[Array, Any], Array]:
-    """The p + 1 numbers with the same norm and the same Gauss–Newton step as all residuals.
-
-    The solver then carries p × p numbers through its loop however many rows there are.
+    Args:
+        here: At the point.
+        freedom: (n − p)/p.
     """
-
-    @jax.custom_jvp
-    def small(x: Array, args: Any) -> Array:
-        return point(x, args)[0]
-
-    @small.defjvp
-    def _(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
-        value, triangle = point(*primals)
-        return value, jnp.append(triangle @ tangents[0], 0.0)
-
-    return small
+    size = jnp.sqrt(jnp.diagonal(here.gram))
+    scale = jnp.where(size > 0, 1.0 / jnp.where(size > 0, size, 1.0), 0.0)
+    gram = here.gram * scale[:, None] * scale + ROUNDING * len(size) * jnp.eye(len(size))
+    inside = jax.scipy.linalg.solve_triangular(jnp.linalg.cholesky(gram), here.slope * scale, lower=True)
+    along = inside @ inside
+    return jnp.sqrt(freedom * along / jnp.maximum(here.square - along, jnp.finfo(along.dtype).tiny))

@@ -10,7 +10,8 @@ from jaxtyping import ArrayLike, Float
 
 from fitmat.maths.quadrature import AZIMUTH_NODES, ZENITH_NODES, incidence_rule, lobe_rule
 from fitmat.models.base import AbstractBRDF
-from fitmat.models.values import Draws, blocks, numbers, widths
+from fitmat.models.parameters import vector
+from fitmat.models.values import Draws, blocks, widths
 
 FINE = (ZENITH_NODES, AZIMUTH_NODES)
 
@@ -58,7 +59,7 @@ def albedo(model: AbstractBRDF, theta_i: ArrayLike | None = None, phi_i: ArrayLi
     if theta_i is None:
         return _from_everywhere(model)
     theta, phi = np.broadcast_arrays(np.atleast_1d(np.asarray(theta_i, float)), np.asarray(phi_i, float))
-    part = model, numbers(model)[None]
+    part = model, vector(model)[None]
     fine, coarse = (_albedo(part, float(widths(*part)[0]), (theta, phi), nodes) for nodes in (FINE, COARSE))
     return Albedo(fine, 2.0 * np.abs(fine - coarse) + LEAST)
 

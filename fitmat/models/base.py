@@ -16,6 +16,7 @@ from jaxtyping import ArrayLike, Float
 
 from fitmat._types import Directions, Samples, Scalar, Spectrum, Vec3
 from fitmat.errors import ModelError
+from fitmat.maths.programs import program
 from fitmat.models.parameters import param
 
 
@@ -185,7 +186,7 @@ def evaluate(model: AbstractBRDF, wi: ArrayLike, wo: ArrayLike) -> Float[np.ndar
             raise ModelError(f"{label} row {row} has length {length[row]:.6g}: expected unit vectors.")
     count = len(pair[0])
     wi, wo = (np.pad(w, ((0, padded_length(count) - count), (0, 0)), mode="edge") for w in pair)
-    return np.asarray(_evaluate_jit(model, jnp.asarray(wi), jnp.asarray(wo)))[:count]
+    return np.asarray(_evaluate_jit(model, wi, wo))[:count]
 
 
-_evaluate_jit = eqx.filter_jit(evaluate_pairs)
+_evaluate_jit = program(evaluate_pairs)

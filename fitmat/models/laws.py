@@ -5,12 +5,12 @@ It measures; what a model is known to break, its class declares (`AbstractBRDF.b
 
 import dataclasses
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from fitmat.maths.programs import program
 from fitmat.models.albedo import albedo
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.parameters import Entry, bounds, entries, vector, with_vector
@@ -79,8 +79,8 @@ def check(template: AbstractBRDF, *, seed: int) -> dict[str, Finding]:
         Law → finding, in the order of `LAWS`.
     """
     rng = np.random.default_rng(seed)
-    values = jnp.asarray(_drawn(template, rng))
-    smallest, gap = _signs(template, values, *(jnp.asarray(w) for w in _pairs(rng)))
+    values = _drawn(template, rng)
+    smallest, gap = _signs(template, values, *_pairs(rng))
     reflected = [albedo(with_vector(template, v), ANGLES) for v in values]
     above = max(float((a.value - a.error).max()) for a in reflected)
     white = albedo(_white(template), ANGLES).value.ravel()
@@ -129,7 +129,7 @@ def _white(template: AbstractBRDF) -> AbstractBRDF:
         wanted = (WHITE | ROUGH).get(entry.name.rpartition(".")[2])
         if wanted is not None:
             values[entry.place] = wanted
-    return with_vector(template, jnp.asarray(values))
+    return with_vector(template, values)
 
 
 def _pairs(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -143,7 +143,7 @@ def _pairs(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     return wi, wo
 
 
-@eqx.filter_jit
+@program
 def _signs(template: AbstractBRDF, values: Array, wi: Array, wo: Array) -> tuple[Array, Array]:
     """The smallest value, and the largest gap between the two directions relative to their sum."""
 
@@ -192,11 +192,11 @@ def unbounded(template: AbstractBRDF) -> int:
     rows = list(ends)
     for k in range(len(given)):
         rows += [np.where(np.arange(len(given)) == k, bound, given) for bound in ends]
-    wi, wo = (jnp.asarray(np.array(column)) for column in zip(*singular().values(), strict=True))
-    return int(_not_finite(template, jnp.asarray(np.array(rows)), wi, wo))
+    wi, wo = (np.array(column) for column in zip(*singular().values(), strict=True))
+    return int(_not_finite(template, np.array(rows), wi, wo))
 
 
-@eqx.filter_jit
+@program
 def _not_finite(template: AbstractBRDF, values: Array, wi: Array, wo: Array) -> Array:
     def total(v: Array, a: Array, b: Array) -> Array:
         return jnp.sum(with_vector(template, v)(a, b))

@@ -8,12 +8,13 @@ from collections.abc import Sequence
 from typing import Any, Literal, TypeVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.flatten_util import ravel_pytree
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from fitmat.errors import ModelError
+from fitmat.maths.arrays import library
 
 M = TypeVar("M", bound=eqx.Module)
 
@@ -65,15 +66,15 @@ def param(
     return eqx.field(converter=_as_optional if optional else as_parameter, metadata={"param": meta}, **extra)
 
 
-def _as_optional(value: Any) -> Array | None:
+def _as_optional(value: Any) -> Any:
     return None if value is None else as_parameter(value)
 
 
-def as_parameter(value: Any) -> Array:
-    """A number, or one number per channel, as a floating-point array."""
+def as_parameter(value: Any) -> Any:
+    """A number, or one number per channel, as a floating-point array: JAX's inside a program, else NumPy's."""
     if value is None or isinstance(value, str | bytes | bool):
         raise ModelError(f"parameter value {value!r}: expected a number or one number per channel.")
-    return jnp.asarray(value, float)
+    return jnp.asarray(value, float) if isinstance(value, jax.Array) else np.asarray(value, float)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -123,14 +124,22 @@ def entries(model: eqx.Module) -> tuple[Entry, ...]:
     return tuple(result)
 
 
-def vector(model: eqx.Module) -> Float[Array, " p"]:
-    """All parameter values as one vector, physical units."""
-    return ravel_pytree(model)[0]
+def vector(model: eqx.Module) -> Any:
+    """All parameter values as one vector (p,), physical units; of NumPy outside of programs."""
+    leaves = jax.tree.leaves(model)
+    xp = library(*leaves)
+    return xp.concatenate([xp.ravel(xp.asarray(leaf)) for leaf in leaves]) if leaves else np.zeros(0)
 
 
-def with_vector(model: M, values: Float[Array, " p"]) -> M:
-    """The same model with the parameter values of `values`, the inverse of `vector`."""
-    return ravel_pytree(model)[1](values)
+def with_vector(model: M, values: Any) -> M:
+    """The same model with the parameter values of `values`, (p,), the inverse of `vector`."""
+    leaves, structure = jax.tree.flatten(model)
+    parts, start = [], 0
+    for leaf in leaves:
+        stop = start + np.size(leaf)
+        parts.append(values[start:stop].reshape(np.shape(leaf)))
+        start = stop
+    return jax.tree.unflatten(structure, parts)
 
 
 def bounds(model: eqx.Module) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:

@@ -5,18 +5,18 @@ It knows no measurement and no draw's meaning; what is done with the values is N
 
 import itertools
 from collections.abc import Iterator, Sequence
-from typing import Any, TypeVar
+from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from fitmat._types import Samples
+from fitmat.maths.programs import program
 from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
-from fitmat.models.parameters import with_vector
+from fitmat.models.parameters import vector, with_vector
 
 SMALL, LARGE = (32, 1024), (16, 16384)
 """Draws and directions of the two blocks that are compiled; the large one is compiled only where it is filled by half.
@@ -25,8 +25,6 @@ A block takes 0.01–0.02 µs a value and 0.2 ms; a coat or a lobe that integrat
 besides, however many directions follow. Draws that fill up a block cost nothing.
 """
 
-
-M = TypeVar("M", bound=AbstractBRDF)
 
 Draws = tuple[AbstractBRDF, Float[np.ndarray, "d p"]]
 """A model and parameter vectors of it."""
@@ -67,7 +65,7 @@ def values(
 
 def at(model: AbstractBRDF, wi: Float[np.ndarray, "n 3"], wo: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n c"]:
     """`values` at the model's own parameters."""
-    return values(model, numbers(model)[None], wi, wo)[0]
+    return values(model, vector(model)[None], wi, wo)[0]
 
 
 def blocks(
@@ -103,22 +101,8 @@ def widths(model: AbstractBRDF, draws: Float[np.ndarray, "d p"]) -> Float[np.nda
 
 def surfaces(model: AbstractBRDF, draws: Float[np.ndarray, "d p"]) -> Draws:
     """The material without what instrument and mount do, and its part of every draw; see `instrument.surface`."""
-    places = numbers(surface(drawn(model, np.arange(draws.shape[1]))))
+    places = vector(surface(with_vector(model, np.arange(draws.shape[1]))))
     return surface(model), draws[:, places]
-
-
-def drawn(model: M, draw: np.ndarray) -> M:
-    """`parameters.with_vector` in NumPy, without a compiled program: for formulas that take either."""
-    leaves, structure = jax.tree.flatten(model)
-    parts = np.split(draw, np.cumsum([np.size(leaf) for leaf in leaves])[:-1])
-    return jax.tree.unflatten(
-        structure, [part.reshape(np.shape(leaf)) for part, leaf in zip(parts, leaves, strict=True)]
-    )
-
-
-def numbers(model: AbstractBRDF) -> Float[np.ndarray, " p"]:
-    """`parameters.vector` as a NumPy array, without a compiled program."""
-    return np.concatenate([np.ravel(np.asarray(leaf)) for leaf in jax.tree.leaves(model)])
 
 
 def _block_shape(draws: int, directions: int) -> tuple[int, int]:
@@ -136,7 +120,7 @@ def _filled(part: np.ndarray, count: int) -> np.ndarray:
     return np.pad(np.asarray(part, float), ((0, count - len(part)), (0, 0)), mode="edge")
 
 
-@eqx.filter_jit
+@program
 def _block(
     template: AbstractBRDF, draws: ArrayLike, wi: ArrayLike, wo: ArrayLike, count: ArrayLike
 ) -> tuple[Float[Array, "D N c"], Float[Array, " D"]]:

@@ -15,9 +15,12 @@ from fitmat._types import Progress
 from fitmat.errors import FitmatError, OutputError
 from fitmat.fitting.result import Fit
 from fitmat.uncertainty.checkpoint import Checkpoint, Saved, digest
-from fitmat.uncertainty.density import default_walkers, log_posterior, physical
+from fitmat.uncertainty.density import log_posterior, physical
 from fitmat.uncertainty.laplace import draws, independent_proposal, laplace
 from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAU, Diagnostics, Posterior, split_rhat
+
+WALKERS = 64
+"""Of the ensemble; four for each dimension where there are more than sixteen."""
 
 CHUNK = 50
 """Steps between looks at the autocorrelation time."""
@@ -51,7 +54,7 @@ def sample(
     Args:
         fit: A fit with a finite optimum.
         seed: Seed of the whole run; the same seed gives the same chain.
-        walkers: Size of the ensemble; default the larger of 32 and 4 per dimension.
+        walkers: Size of the ensemble; default the larger of `WALKERS` and 4 per dimension.
         max_steps: Cap on steps per walker.
         progress: Called now and then with steps done and expected.
         checkpoint: Folder in which the run is kept while it lasts, and from which the same run goes on after it was
@@ -118,10 +121,10 @@ def _ensemble(fit: Fit, seed: int, walkers: int | None) -> tuple[Any, Any]:
             "fit under --loss default."
         )
     rng = np.random.default_rng(seed)
-    walkers = walkers or default_walkers(fit)
+    walkers = walkers or max(WALKERS, 4 * (len(fit.free) + 1))
     independent = emcee.moves.MHMove(independent_proposal(fit))
     moves = [(independent, 0.6), (emcee.moves.DEMove(), 0.3), (emcee.moves.DESnookerMove(), 0.1)]
-    density = log_posterior(fit, walkers)
+    density = log_posterior(fit)
     sampler: Any = emcee.EnsembleSampler(walkers, len(fit.free) + 1, density, moves=moves, vectorize=True)
     sampler.log_prob_fn = density  # emcee's wrapper prints a traceback to stdout on Ctrl-C
     random_state = np.random.RandomState(rng.integers(2**32)).get_state()
@@ -131,7 +134,7 @@ def _ensemble(fit: Fit, seed: int, walkers: int | None) -> tuple[Any, Any]:
 def _run(fit: Fit, state: Any, seed: int, max_steps: int) -> bytes:
     """Digest of all that decides a chain: its beginning, the density there, model, data, loss, seed and versions."""
     versions = [f"{name} {importlib.metadata.version(name)}" for name in SAMPLED_BY]
-    density = log_posterior(fit, len(state.coords))(state.coords)
+    density = log_posterior(fit)(state.coords)
     words = ", ".join(
         [fit.name, fit.loss.name, f"seed {seed}", f"at most {max_steps} steps", *sorted(fit.held), *versions]
     )

@@ -7,45 +7,51 @@ under a loss that infers none. The priors are those of `priors`. Nothing is draw
 from collections.abc import Callable
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, ArrayLike
 
 from fitmat.fitting.coordinates import Coordinates
-from fitmat.fitting.likelihood import Data, log_density, mapped, noise_scale
+from fitmat.fitting.likelihood import Data, log_density, mapped
 from fitmat.fitting.result import Fit
+from fitmat.maths.programs import program
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector
+from fitmat.models.values import slices
 from fitmat.uncertainty.scaled_weights import sampled
 
-
-def default_walkers(fit: Fit) -> int:
-    """The larger of 32 and four per sampled dimension."""
-    return max(32, 4 * (len(fit.free) + 1))
+AT_ONCE = 128
+"""Points for which the density's program is compiled; fewer cost no more than they are."""
 
 
-def log_posterior(fit: Fit, batch: int = 1) -> Callable[[np.ndarray], np.ndarray]:
+def log_posterior(fit: Fit) -> Callable[[np.ndarray], np.ndarray]:
     """The log posterior density over (w, free + 1) sampled coordinates as one compiled call; −inf outside.
 
     Args:
         fit: What is sampled.
-        batch: Smaller w are filled up to this many, so that one program serves whole and half ensembles.
     """
-    arrays, static = eqx.partition((fit.model, fit.data), eqx.is_array)
     moved = sampled(fit)
+    example = np.zeros((AT_ONCE, moved.count + 1))
+    run = _log_posterior.bound((fit.model, fit.data, moved), example, np.array(1))
 
-    def call(coordinates: np.ndarray) -> np.ndarray:
-        filled = np.pad(coordinates, ((0, max(0, batch - len(coordinates))), (0, 0)), mode="edge")
-        return np.asarray(_log_posterior(arrays, static, moved, jnp.asarray(filled)))[: len(coordinates)]
+    def block(points: np.ndarray) -> np.ndarray:
+        filled = example.copy()
+        filled[: len(points)] = points
+        return np.asarray(run(filled, np.array(len(points))))[: len(points)]
+
+    def call(points: np.ndarray) -> np.ndarray:
+        if len(points) <= AT_ONCE:
+            return block(points)
+        return np.concatenate([block(points[part]) for part in slices(len(points), AT_ONCE)])
 
     return call
 
 
-@eqx.filter_jit
-def _log_posterior(arrays: Any, static: Any, moved: Coordinates, coordinates: Array) -> Array:
-    template, data = eqx.combine(arrays, static)
-    return mapped(lambda x: log_density_at(template, data, moved, x), coordinates)
+@program
+def _log_posterior(
+    template: AbstractBRDF, data: Data, moved: Coordinates, points: ArrayLike, count: ArrayLike
+) -> Array:
+    return mapped(lambda x: log_density_at(template, data, moved, x), jnp.asarray(points), count)
 
 
 def log_density_at(template: AbstractBRDF, data: Data, moved: Coordinates, x: Array) -> Array:
@@ -61,7 +67,7 @@ def log_density_at(template: AbstractBRDF, data: Data, moved: Coordinates, x: Ar
     t, s = natural[:-1], natural[-1]
     inside = jnp.all((t >= moved.low) & (t <= moved.high)) & (s >= 0.0)
     here = moved.model(template, vector(template), jnp.where(inside, t, moved.low))
-    inert = jnp.zeros(()) if data.loss.infers_discrepancy else 0.5 * (s / noise_scale(data)) ** 2
+    inert = jnp.zeros(()) if data.loss.infers_discrepancy else 0.5 * (s / data.typical) ** 2
     value = log_density(here, data, _inferred(data, jnp.abs(s))) - inert
     return jnp.where(inside & jnp.isfinite(value), value, -jnp.inf)
 

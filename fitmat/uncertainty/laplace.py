@@ -15,10 +15,9 @@ from jaxtyping import Float
 from fitmat.fitting import fitting
 from fitmat.fitting.coordinates import Coordinates
 from fitmat.fitting.information import inverse_information
-from fitmat.fitting.likelihood import noise_scale
 from fitmat.fitting.result import Fit
 from fitmat.measurements.samples import Measurements
-from fitmat.uncertainty.density import default_walkers, log_posterior, physical
+from fitmat.uncertainty.density import log_posterior, physical
 from fitmat.uncertainty.posterior import GOOD_PARETO, Posterior
 from fitmat.uncertainty.scaled_weights import sampled, scaled_gaussian
 
@@ -176,10 +175,7 @@ def _reweighted(fit: Fit, rng: np.random.Generator) -> tuple[np.ndarray | None, 
     """Resampled draws of the sampled coordinates (None where the weights are no good), and k̂ of the weights."""
     around = heavy_tailed(fit)
     proposed = around.drawn_inside(PROPOSALS, rng)
-    size = default_walkers(fit)
-    density = log_posterior(fit, size)  # in blocks of the size that is compiled already
-    blocks = [density(proposed[k : k + size]) for k in range(0, len(proposed), size)]
-    logs = np.concatenate([np.zeros(0), *blocks]) - around.log_density(proposed)
+    logs = log_posterior(fit)(proposed) - around.log_density(proposed) if len(proposed) else np.zeros(0)
     alive = np.isfinite(logs)
     proposed, logs = proposed[alive], logs[alive]
     if len(logs) < FEWEST:
@@ -209,13 +205,13 @@ def _discrepancy_sd(fit: Fit) -> float:
     """
     if fit.discrepancy_sd is not None:
         return fit.discrepancy_sd
-    unit = max(float(noise_scale(fit.data)), 1e-12)
+    unit = max(float(fit.data.typical), 1e-12)
     moves = np.sort(np.concatenate([unit * 2.0 ** np.arange(-12, 12), fit.discrepancy * 2.0 ** np.arange(-6, 2)]))
     moves = moves[moves > 0]
     moved = sampled(fit)
     natural = moved.natural(fit.values)
     along = moved.scaled(np.vstack([np.append(natural, fit.discrepancy + move) for move in (0.0, *moves)]))
-    density = log_posterior(fit, default_walkers(fit))(along)
+    density = log_posterior(fit)(along)
     drop = density[0] - density[1:]
     crossing = np.flatnonzero(drop > 2.0)
     if len(crossing) == 0:

@@ -17,8 +17,9 @@ from jaxtyping import Array, Float
 from fitmat.errors import FitmatError
 from fitmat.extras import needed
 from fitmat.fitting.coordinates import Coordinates
-from fitmat.fitting.likelihood import mapped
+from fitmat.fitting.likelihood import Data, mapped
 from fitmat.fitting.result import Fit
+from fitmat.models.base import AbstractBRDF
 from fitmat.text import html_table, text_table
 from fitmat.uncertainty.density import log_density_at, physical
 from fitmat.uncertainty.laplace import draws
@@ -224,8 +225,7 @@ def _sampled(fit: Fit, seed: int, chains: int, warmup: int, count: int) -> tuple
     least = 1e-3 * max(float(np.median(start[:, -1])), 1e-12)
     begin = np.column_stack([np.log(inside / (1.0 - inside)), np.log(np.maximum(start[:, -1], least))])
     keys = jax.random.split(jax.random.key(int(rng.integers(2**31))), chains)
-    arrays, static = eqx.partition((fit.model, fit.data), eqx.is_array)
-    x, diverged = _chains(arrays, static, moved, (keys, jnp.asarray(begin)), (warmup, count))
+    x, diverged = _chains(fit.model, fit.data, moved, (keys, jnp.asarray(begin)), (warmup, count))
     x = np.asarray(x)
     values, s = physical(fit, x.reshape(-1, x.shape[-1]))
     return np.column_stack([values[:, fit.free], s]).reshape(x.shape), np.asarray(diverged)
@@ -233,15 +233,14 @@ def _sampled(fit: Fit, seed: int, chains: int, warmup: int, count: int) -> tuple
 
 @eqx.filter_jit
 def _chains(
-    arrays: Any,
-    static: Any,
+    template: AbstractBRDF,
+    data: Data,
     moved: Coordinates,
     begin: tuple[Array, Array],
     steps: tuple[int, int],
 ) -> tuple[Array, Array]:
     """NUTS from several starts: sampled coordinates, (chains, draws, d), and whether each step diverged."""
     blackjax = require()
-    template, data = eqx.combine(arrays, static)
     low, high = jnp.asarray(moved.low), jnp.asarray(moved.high)
 
     def placed(u: Array) -> tuple[Array, Array]:

@@ -11,7 +11,6 @@ blind where a parameter is not determined, and random draws would miss what a na
 import dataclasses
 from typing import Literal
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -134,7 +133,7 @@ def next_angles(
     banks = tuple(bank(f) for f in fits)
     better = int(np.argmin([f.discrepancy for f in fits]))
     match = (better, 1 - better) if target == MATCH else None
-    task = Task(jnp.asarray(_law(fit)), jnp.asarray(float(repeats)), _wanted(fit, target), match)
+    task = Task(_law(fit), np.asarray(float(repeats)), _wanted(fit, target), match)
     history: list[int] = []
     proposals: list[Proposal] = []
     gains = np.zeros(0)
@@ -202,5 +201,5 @@ def _expected(
     rows[: len(history)] = history
     past[: len(history)] = looked.used[history]
     given = (wi, wo, looked.used & (not blank)), (wi[rows], wo[rows], past)
-    score, sd = scores(banks, task, *(tuple(jnp.asarray(p) for p in part) for part in given))
+    score, sd = scores(banks, task, *given)
     return np.asarray(score), np.asarray(sd)

@@ -17,6 +17,7 @@ from fitmat.fitting.losses import Loss
 from fitmat.fitting.result import Fit
 from fitmat.judgement.identifiability.profiles import profiles
 from fitmat.judgement.identifiability.ridge import Ridge, ridge
+from fitmat.maths.programs import program
 from fitmat.models.base import AbstractBRDF
 
 TRUTHS = 16
@@ -27,14 +28,14 @@ class Bank(eqx.Module):
     """A ridge for compiled programs: its Gaussians, the model they belong to, and which centres serve as truths."""
 
     template: AbstractBRDF
-    base: Array
+    base: Any
     moved: Coordinates = eqx.field(static=True)
     loss: Loss = eqx.field(static=True)
-    s: Array
-    logs: Array
-    centre: Array
-    covariance: Array
-    truths: Array
+    s: Any
+    logs: Any
+    centre: Any
+    covariance: Any
+    truths: Any
 
     def predicted(self, t: Array, wi: Array, wo: Array) -> Array:
         """f κ at the natural coordinates t, (c,)."""
@@ -44,8 +45,8 @@ class Bank(eqx.Module):
 class Task(eqx.Module):
     """What candidates are judged by: the law of the noise, repeats, the places asked for, and (truth, rival)."""
 
-    law: Array
-    repeats: Array
+    law: Any
+    repeats: Any
     wanted: tuple[int, ...] = eqx.field(static=True)
     match: tuple[int, int] | None = eqx.field(static=True)
 
@@ -56,10 +57,10 @@ def bank(fit: Fit) -> Bank:
     middles = (np.arange(TRUTHS) + 0.5) / TRUTHS
     truths = np.minimum(np.searchsorted(np.cumsum(found.weight), middles), len(found.weight) - 1)
     arrays = (np.asarray(fit.discrepancy), np.log(found.weight + 1e-300), found.centre, found.covariance, truths)
-    return Bank(fit.model, jnp.asarray(fit.values), fit.coordinates, fit.data.loss, *(jnp.asarray(a) for a in arrays))
+    return Bank(fit.model, fit.values, fit.coordinates, fit.data.loss, *arrays)
 
 
-@eqx.filter_jit
+@program
 def scores(banks: tuple[Bank, ...], task: Task, candidates: Any, history: Any) -> tuple[Array, Array]:
     """Score of every candidate (k,), larger is better, and the sd it leaves for each truth, natural, (k, t, f).
 

@@ -6,7 +6,6 @@ It looks at no measured value but for the noise; what the sample is, it does not
 import dataclasses
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -14,6 +13,7 @@ from jaxtyping import Array, Float
 
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.information import UNDETERMINED, inverse_information
+from fitmat.maths.programs import program
 from fitmat.measurements.noise import noise_law
 from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
@@ -88,7 +88,7 @@ def prospects(m: Measurements, sigma: Float[np.ndarray, "n c"], *, known: bool) 
     wi, wo = (np.concatenate([part[kept], np.tile([0.0, 0.0, 1.0], (blank, 1))]) for part in (m.wi, m.wo))
     weight = np.concatenate([np.full(len(kept), len(rows) / len(kept)), np.zeros(blank)])
     found = []
-    arrays = [jnp.asarray(part) for part in (wi, wo, weight, absolute, relative)]
+    arrays = [np.asarray(part, float) for part in (wi, wo, weight, absolute, relative)]
     for name, glosses in GLOSSES.items():
         for gloss, values in glosses.items():
             truth = model(name, channels=1, **values)
@@ -96,7 +96,7 @@ def prospects(m: Measurements, sigma: Float[np.ndarray, "n c"], *, known: bool) 
     return tuple(found)
 
 
-@eqx.filter_jit
+@program
 def _information(
     truth: AbstractBRDF, wi: Array, wo: Array, weight: Array, absolute: Array, relative: Array
 ) -> Float[Array, "p p"]:

@@ -4,21 +4,16 @@ Judges nothing: what a flat profile means, `verdicts` says. The discrepancy s is
 """
 
 import dataclasses
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from fitmat.fitting.coordinates import Coordinates
-from fitmat.fitting.information import expected_information, inverse_information
-from fitmat.fitting.likelihood import Data, every_residual, mapped
+from fitmat.fitting.coordinates import coordinates
+from fitmat.fitting.information import inverse_information, normal_equations_at
+from fitmat.fitting.likelihood import Data
 from fitmat.fitting.result import Fit
-from fitmat.maths.least_squares import least_squares
-from fitmat.models.base import AbstractBRDF, evaluate_pairs
-from fitmat.models.parameters import vector, with_vector
+from fitmat.models.values import at
 
 STEPS = 16
 """Points on either side of the best value."""
@@ -36,10 +31,10 @@ LEVEL = 1.959964
 """√(2Δ) at the ends of a 95 % interval: 2Δ follows χ² with one degree of freedom (Wilks 1938)."""
 
 PRECISE = 1e-5
-"""Tolerance of the inner optima in units of the problem: Δ is then right to far better than 0.01."""
+"""Inner optima end where Δ would fall by less."""
 
-_INSIDE = 1e-6
-# Starts are this fraction of the range away from a bound, where the sine has no slope.
+MOST_ITERATIONS = 40
+"""Of the inner optima."""
 
 ROWS = 4096
 """Of more rows an evenly spread part stands for all, with values that the best model predicts exactly."""
@@ -86,7 +81,7 @@ class Profile:
 
 
 def profiles(fit: Fit) -> tuple[Profile, ...]:
-    """The profile likelihood of every free parameter, in one compiled program.
+    """The profile likelihood of every free parameter.
 
     From the best fit outwards on both sides, each point starts where the last one ended; steps are chosen so that
     √(2Δ) grows evenly to `FARTHEST` (Venzon & Moolgavkar 1988; Raue et al. 2009). Holding s narrows the intervals by
@@ -100,47 +95,115 @@ def profiles(fit: Fit) -> tuple[Profile, ...]:
     """
     if not len(fit.free) or not fit.finite:
         return ()
-    moved, places = fit.coordinates, fit.free
-    low, high = moved.low, moved.high
-    best = np.clip(moved.natural(fit.values), low, high)
-    sides = [(k, sign) for k in range(len(places)) for sign in (-1.0, 1.0)]
-    ends = _run(fit, np.array(sides), np.tile(best, (len(sides), 1)), np.full((len(sides), STEPS), np.nan))
-    known = expected_information(fit.model, representative(fit), jnp.asarray(fit.discrepancy))
-    here = Points(best, np.zeros(()), best, np.asarray(known)[np.ix_(places, places)])
+    moved, surface = fit.coordinates, _Surface(fit)
+    low, high, span, best = moved.low, moved.high, moved.span, surface.best
+    held = np.repeat(np.arange(moved.count), 2)
+    sign, each = np.tile([-1.0, 1.0], moved.count), np.arange(2 * moved.count)
+    known = surface.gram
+    unit = np.minimum(np.sqrt(np.diagonal(inverse_information(known, span))), span)[held]
+    tangent = _tangents(np.broadcast_to(known, (len(held), *known.shape)), held, span)
+    reach = np.where(sign > 0, (high - best)[held], (best - low)[held])
+    t = np.tile(best, (len(held), 1))
+    offset, last, root = np.zeros(len(held)), unit * FARTHEST / STEPS, np.zeros(len(held))
     found = []
+    for target in np.linspace(0.0, FARTHEST, STEPS + 1)[1:]:
+        longest = LONGEST / np.max(np.abs(tangent) / span, axis=1)
+        ahead, last = _ahead(offset, last, root, target, longest)
+        ahead = np.minimum(ahead, reach)
+        t = np.clip(t + tangent * (sign * (ahead - offset))[:, None], low, high)
+        t[each, held] = best[held] + sign * ahead
+        offset = ahead
+        points = surface.settled(t, held)
+        t, root = points.coordinates, np.sqrt(2.0 * np.maximum(points.rise, 0.0))
+        tangent = _tangents(points.information, held, span)
+        found.append(points)
+    sides = Points(*(np.stack(part, axis=1) for part in zip(*found, strict=True)))
+    here = Points(best, np.zeros(()), best, known)
+    result = []
     for k, name in enumerate(moved.names):
-        parts = zip(ends, (best[k], *here[1:]), strict=True)
+        parts = zip(sides, (best[k], *here[1:]), strict=True)
         points = Points(*(np.concatenate([a[2 * k][::-1], [centre], a[2 * k + 1]]) for a, centre in parts))
         limits, opened = _interval(points.at, points.rise, STEPS, (low[k], high[k]))
-        found.append(Profile(name, k, points, limits, opened))
-    return tuple(found)
+        result.append(Profile(name, k, points, limits, opened))
+    return tuple(result)
 
 
 def along(fit: Fit, place: int, held: Float[np.ndarray, " m"], guess: Float[np.ndarray, "m f"]) -> Points:
-    """The profile of one parameter at given natural values, by the program that `profiles` runs.
+    """The profile of one parameter at given natural values.
 
     Args:
         fit: As for `profiles`.
         place: Of the parameter among the free ones.
-        held: Its values, in order; at most 2 f `STEPS` of them.
+        held: Its values.
         guess: Roughly where the free parameters are there, natural, (m, f).
     """
-    sides, most = 2 * len(fit.free), 2 * len(fit.free) * STEPS
-    which = np.minimum(np.arange(most), len(held) - 1).reshape(sides, STEPS)
-    found = _run(fit, np.tile([place, 1.0], (sides, 1)), guess[which[:, 0]], held[which])
-    return Points(*(part.reshape(most, *part.shape[2:])[: len(held)] for part in found))
+    t = np.clip(guess, fit.coordinates.low, fit.coordinates.high)
+    t[:, place] = held
+    return _Surface(fit).settled(t, np.full(len(held), place))
 
 
-def _run(fit: Fit, sides: np.ndarray, start: np.ndarray, held: np.ndarray) -> Points:
-    span = fit.coordinates.span
-    known = fit.information[np.ix_(fit.free, fit.free)]
-    unit = np.minimum(np.sqrt(np.diagonal(inverse_information(known, span))), span)
-    released = np.linalg.inv(known + np.diag(12.0 / span**2))
-    slopes = released / np.diagonal(released)[:, None]
-    tasks = tuple(jnp.asarray(part) for part in (unit, slopes, sides, start, held))
-    s, values = jnp.asarray(fit.discrepancy), jnp.asarray(fit.values)
-    traced = _traced(fit.model, representative(fit), s, values, fit.coordinates, tasks)
-    return Points(*(np.asarray(part) for part in traced))
+class _Surface:
+    """½ Σ residual² over the free natural coordinates of a fit, s held.
+
+    Attributes:
+        best: The fit's own, kept within the bounds, (f,).
+        gram: JᵀJ there, (f, f).
+    """
+
+    def __init__(self, fit: Fit) -> None:
+        self._fit, self._data, self._moved = fit, representative(fit), fit.coordinates
+        self.best = np.clip(self._moved.natural(fit.values), self._moved.low, self._moved.high)
+        square, _, gram = self._at(self.best[None])
+        self._square, self.gram = square[0], gram[0]
+
+    def _at(self, t: Float[np.ndarray, "m f"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        values, free = self._moved.filled(self._fit.values, t), self._fit.free
+        natural = coordinates(self._fit.model).natural(values)
+        square, slope, gram = normal_equations_at(self._fit.model, self._data, natural, self._fit.discrepancy)
+        return square, slope[:, free], gram[:, free[:, None], free]
+
+    def settled(self, t: Float[np.ndarray, "m f"], held: np.ndarray) -> Points:
+        """The optima of the other parameters from t on, with one parameter of each point held; kept in the bounds.
+
+        Levenberg–Marquardt for all points together, projected onto the bounds (Bertsekas 1982).
+        """
+        each, span = np.arange(len(t)), self._moved.span
+        low, high = self._moved.low, self._moved.high
+        square, slope, gram = self._at(t)
+        damping, moving = np.full(len(t), 1e-6), np.ones(len(t), bool)
+        for _ in range(MOST_ITERATIONS):
+            blocked = ((t <= low) & (slope > 0)) | ((t >= high) & (slope < 0))
+            blocked[each, held] = True
+            step, promised = _steps(slope, gram, blocked, damping, span)
+            moving &= promised > PRECISE
+            which = np.flatnonzero(moving)
+            if len(which) == 0:
+                break
+            tried = np.clip(t[which] + step[which], low, high)
+            found = self._at(tried)
+            better = found[0] <= square[which]
+            damping[which] = np.where(better, damping[which] * 0.1, np.maximum(damping[which] * 10.0, 1e-3))
+            moving[which[damping[which] > 1e6]] = False
+            taken = which[better]
+            t = t.copy()
+            t[taken], square[taken] = tried[better], found[0][better]
+            slope[taken], gram[taken] = found[1][better], found[2][better]
+        return Points(t[each, held], 0.5 * (square - self._square), t, gram)
+
+
+def _steps(
+    slope: np.ndarray, gram: np.ndarray, blocked: np.ndarray, damping: np.ndarray, span: np.ndarray
+) -> tuple[Float[np.ndarray, "m f"], Float[np.ndarray, " m"]]:
+    """Damped Gauss–Newton steps of the parameters that are not blocked, and how far ½ Σ residual² falls by them."""
+    free = ~blocked
+    unit = np.sqrt(np.maximum(np.diagonal(gram, axis1=1, axis2=2), 1e-12 / span**2))
+    scaled = np.where(free[:, :, None] & free[:, None, :], gram / (unit[:, :, None] * unit[:, None, :]), 0.0)
+    eye = np.eye(slope.shape[1])
+    system = scaled + eye * (np.where(free, damping[:, None], 1.0)[:, :, None] + 1e-14)
+    against = np.where(free, -slope / unit, 0.0)
+    z = np.linalg.solve(system, against[..., None])[..., 0]
+    promised = np.einsum("mi,mi->m", against, z) - 0.5 * np.einsum("mi,mij,mj->m", z, scaled, z)
+    return z / unit, promised
 
 
 def representative(fit: Fit) -> Data:
@@ -153,87 +216,25 @@ def representative(fit: Fit) -> Data:
     if stride == 1:
         return fit.data
     part = fit.data.every(stride)
-    exact = evaluate_pairs(fit.model, part.wi, part.wo) * part.kappa
+    exact = at(fit.model, part.wi, part.wo) * part.kappa
     return dataclasses.replace(part, x=exact, weight=part.weight * np.sqrt(stride))
 
 
-@eqx.filter_jit
-def _traced(
-    template: AbstractBRDF, data: Data, s: Array, values: Array, moved: Coordinates, tasks: tuple[Array, ...]
-) -> tuple[Array, Array, Array, Array]:
-    """What `Points` holds, for each task: a parameter and side, where to start, and the values to hold.
-
-    Where these are NaN, they are chosen on the way. All arrays begin with (tasks, STEPS).
-    """
-    count, places = moved.count, moved.index
-    unit, slopes, sides, starts, given = tasks
-    low, high = jnp.asarray(moved.low), jnp.asarray(moved.high)
-    span = high - low
-
-    def sine(t: Array) -> Array:
-        return jnp.arcsin(jnp.clip(2.0 * (t - low) / span - 1.0, -1.0, 1.0))
-
-    def model(v: Array, k: Array, held: Array) -> AbstractBRDF:
-        """With the free coordinates v of the others and the natural value of the held one."""
-        u = jnp.zeros(count).at[_others(k, count)].set(v).at[k].set(sine(jnp.zeros(count).at[k].set(held))[k])
-        return with_vector(template, moved.from_unbounded(values, u))
-
-    def residual(v: Array, args: tuple[Data, Array, Array]) -> Array:
-        data, k, held = args
-        return every_residual(model(v, k, held), data, s)
-
-    first = every_residual(with_vector(template, values), data, s)
-
-    def one(task: Any) -> tuple[Array, ...]:
-        (k, sign), start, schedule = (task[0][0].astype(int), task[0][1]), task[1], task[2]
-        reach = jnp.where(sign > 0, high[k] - start[k], start[k] - low[k])
-
-        def point(state: tuple, step: tuple[Array, Array]) -> tuple[tuple, tuple]:
-            offset, last, v, root, slope = state
-            target, wanted = step
-            offset, last = _ahead(offset, last, root, target, LONGEST / jnp.max(jnp.abs(slope) / span))
-            offset = jnp.minimum(offset, reach)
-            held = jnp.where(jnp.isnan(wanted), start[k] + sign * offset, wanted)
-            args = (data, k, held)
-            v = least_squares(residual, v, args, tolerance=PRECISE, max_steps=64).x if count > 1 else v
-            here, r = model(v, k, held), residual(v, args)
-            rise = 0.5 * (jnp.vdot(r, r) - jnp.vdot(first, first))
-            matrix = expected_information(here, data, s)[np.ix_(places, places)]
-            root = jnp.sqrt(2.0 * jnp.maximum(rise, 0.0))
-            found = (held, rise, moved.natural(vector(here)), matrix)
-            return (offset, last, v, root, _tangent(matrix, k, span)), found
-
-        v = sine(jnp.clip(start, low + _INSIDE * span, high - _INSIDE * span))[_others(k, count)]
-        begin = (jnp.zeros(()), unit[k] * FARTHEST / STEPS, v, jnp.zeros(()), slopes[k])
-        return jax.lax.scan(point, begin, (jnp.linspace(0.0, FARTHEST, STEPS + 1)[1:], schedule))[1]
-
-    items: Any = (sides, starts, given)
-    return mapped(one, items)
-
-
-def _ahead(offset: Array, last: Array, root: Array, target: Array, longest: Array) -> tuple[Array, Array]:
+def _ahead(
+    offset: np.ndarray, last: np.ndarray, root: np.ndarray, target: float, longest: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """The next distance from the best value, and the step to it, for √(2Δ) = target if that grows as before."""
     growing = root > 0
-    wanted = jnp.where(growing, offset * (target / jnp.where(growing, root, 1.0) - 1.0), GROWTH * last)
-    step = jnp.minimum(jnp.clip(wanted, last / GROWTH, last * GROWTH), longest)
+    wanted = np.where(growing, offset * (target / np.where(growing, root, 1.0) - 1.0), GROWTH * last)
+    step = np.minimum(np.clip(wanted, last / GROWTH, last * GROWTH), longest)
     return offset + step, step
 
 
-def _others(k: Array, count: int) -> Array:
-    """All places but k, (count − 1,)."""
-    every = jnp.arange(count - 1)
-    return jnp.where(every >= k, every + 1, every)
-
-
-def _tangent(known: Array, k: Array, span: Array) -> Array:
-    """dt/dt_k along the ridge, (f,): the others follow so that the residuals change least."""
-    count = len(span)
-    if count == 1:
-        return jnp.ones(1)
-    others = _others(k, count)
-    stiff = known + jnp.diag(12.0 / span**2)
-    follow = -jnp.linalg.solve(stiff[others][:, others], stiff[others, k])
-    return jnp.ones(count).at[others].set(follow)
+def _tangents(known: Float[np.ndarray, "m f f"], held: np.ndarray, span: np.ndarray) -> Float[np.ndarray, "m f"]:
+    """dt/dt_k along the ridge: the others follow so that the residuals change least."""
+    released = np.linalg.inv(known + np.diag(12.0 / span**2))
+    column = np.take_along_axis(released, held[:, None, None], axis=2)[..., 0]
+    return column / np.take_along_axis(column, held[:, None], axis=1)
 
 
 def _interval(
