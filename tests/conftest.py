@@ -13,6 +13,8 @@ import jax
 import numpy as np
 import pytest
 
+from fitmat.maths import programs
+
 jax.config.update("jax_enable_x64", True)
 hypothesis.settings.register_profile("fitmat", derandomize=True, deadline=None, database=None)
 hypothesis.settings.load_profile("fitmat")
@@ -44,6 +46,7 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ.setdefault("XLA_FLAGS", HASTE)
     compiled = Path(os.environ["FITMAT_COMPILED"]) / "fitmat" / "compiled"
     os.environ["XDG_CACHE_HOME"] = os.environ["FITMAT_COMPILED"]
+    os.environ["FITMAT_CACHE"] = str(compiled)
     os.environ["JAX_COMPILATION_CACHE_DIR"] = str(compiled)
     os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"
     jax.config.update("jax_compilation_cache_dir", str(compiled))
@@ -62,6 +65,7 @@ def _forget_programs() -> Iterator[None]:
     yield
     maps = Path("/proc/self/maps")
     if not maps.exists() or maps.read_bytes().count(b"\n") > MOST_MAPS:
+        programs.clear()
         jax.clear_caches()
         gc.collect()
 

@@ -22,6 +22,7 @@ from fitmat.cli.flags.files import (
 from fitmat.cli.flags.fitting import (
     CheckPosteriorFlag,
     FixFlag,
+    FullFlag,
     IorFlag,
     LossFlag,
     MaskingFlag,
@@ -99,6 +100,7 @@ def fit(
     check_posterior: CheckPosteriorFlag = False,
     ior: IorFlag = None,
     tilt: TiltFlag = False,
+    full: FullFlag = False,
 ) -> None:
     """Fit models to a file of measurements and write a report with the Phong–microfacet match."""
     process.set_up()
@@ -110,7 +112,7 @@ def fit(
     from fitmat.studies.study import study
 
     fixed, believed = assignments(fix or [], "--fix"), priors.assignments(prior or [])
-    told = {"loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed, "second_opinion": check_posterior}
+    told = {"loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
     target = out or files.default(file)
     with files.new(target, force=force, stale=page.POSTERIOR.format("*")) as draft:
         process.leave_on_interrupt(draft)
@@ -122,6 +124,8 @@ def fit(
                 fixed=fixed,
                 priors=believed,
                 sampling=not no_mcmc,
+                second_opinion=check_posterior,
+                full=full,
                 resume=files.resumed(target),
                 progress=watch,
                 **told,

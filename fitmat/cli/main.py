@@ -8,6 +8,9 @@ import gc
 import os
 import sys
 
+# Matrices are small: the threads of BLAS cost more, from the import of NumPy on, than they save.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 from fitmat.cli import process
 from fitmat.cli.commands import app
 from fitmat.errors import FitmatError

@@ -225,7 +225,7 @@ def _log_spread(model: AbstractBRDF, data: Data, s: Scalar) -> Samples:
 
 
 def _log_width(noise: Any, data: Data, s: Any) -> Any:
-    xp = library(noise, data.x)
+    xp = library(noise, data.x, s)
     if data.loss.spread is None:
         return xp.zeros_like(data.x)
     return xp.log(data.loss.spread(data.x, noise, data.kappa, s)) - xp.log(data.kappa) - data.loss.log_peak

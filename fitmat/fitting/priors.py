@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import ArrayLike, Float
-from scipy.stats import truncnorm
 
 from fitmat.errors import ModelError
 from fitmat.fitting.coordinates import coordinates
@@ -110,6 +109,8 @@ def draw(
     Raises:
         ModelError: s has a flat prior, from which nothing can be drawn.
     """
+    from scipy.stats import truncnorm
+
     if prior is None or not float(prior.discrepancy) > 0:
         raise ModelError(f"cannot draw from a flat prior of {DISCREPANCY}: state one, for example (0, 0.01).")
     every = coordinates(model)

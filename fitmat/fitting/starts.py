@@ -80,16 +80,16 @@ def _solve_nodes(
     x = values(model, lit.reshape(-1, dark.shape[1]), data.wi, data.wo) * data.kappa
     x = x.reshape(*lit.shape[:2], *data.x.shape)
     offset, columns, predicted = x[:, 0], x[:, 1:] - x[:, :1], x[:, 0]
-    if len(places):
-        root = np.sqrt(data.weight) / spread(data.x, data.noise, s)
-        weighted = (columns * root).reshape(len(nodes), len(places), -1)
-        target = ((data.x - offset) * root).reshape(len(nodes), -1)
-        with np.errstate(all="ignore"):  # a node at which the model is not finite comes last
+    with np.errstate(all="ignore"):  # a node at which the model is not finite comes last
+        if len(places):
+            root = np.sqrt(data.weight) / spread(data.x, data.noise, s)
+            weighted = (columns * root).reshape(len(nodes), len(places), -1)
+            target = ((data.x - offset) * root).reshape(len(nodes), -1)
             gram, moment = weighted @ weighted.transpose(0, 2, 1), np.einsum("kwn,kn->kw", weighted, target)
             dark[:, places] = nonnegative(gram, moment)
             predicted = offset + np.einsum("kw,kwnc->knc", dark[:, places], columns)
-    z = stabilised(data.x, data.noise, s) - stabilised(predicted, data.noise, s)
-    return dark, np.sum(data.weight * z**2, axis=(1, 2))
+        z = stabilised(data.x, data.noise, s) - stabilised(predicted, data.noise, s)
+        return dark, np.sum(data.weight * z**2, axis=(1, 2))
 
 
 def nonnegative(gram: Float[np.ndarray, "... k k"], moment: Float[np.ndarray, "... k"]) -> Float[np.ndarray, "... k"]:

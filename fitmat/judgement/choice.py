@@ -188,7 +188,7 @@ def every_model(measurements: Measurements | None = None) -> tuple[str, ...]:
     return (*names, *OTHER_FRESNELS, "rough-varnish-over-lambert")
 
 
-def choose(posteriors: Sequence[Posterior], *, predicting: bool = True) -> Choice:
+def choose(posteriors: Sequence[Posterior], *, predicting: bool = True, singly: bool = True) -> Choice:
     """Weigh several models of the same measurements.
 
     AICc and BIC charge for each parameter at the optimum. The elpd (Vehtari, Gelman & Gabry 2017) is what the
@@ -199,6 +199,7 @@ def choose(posteriors: Sequence[Posterior], *, predicting: bool = True) -> Choic
     Args:
         posteriors: By `chains.sample`, or `laplace.laplace`; models whose fit is not finite are left out.
         predicting: Whether to refit without each incidence.
+        singly: Whether to ask for the elpd; else AICc decides.
 
     Raises:
         FitmatError: nothing is finite, or fits differ in measurements or loss.
@@ -216,7 +217,7 @@ def choose(posteriors: Sequence[Posterior], *, predicting: bool = True) -> Choic
         raise FitmatError(
             f"the loss {first.loss.name} is no likelihood, so that it weighs no models; try --loss default."
         )
-    found = [weigh(p) for p in usable]
+    found = [weigh(p) if singly else None for p in usable]
     scores = [-0.5 * p.fit.aicc if e is None else e.elpd for p, e in zip(usable, found, strict=True)]
     best = int(np.argmax(scores))
     candidates = []

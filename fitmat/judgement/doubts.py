@@ -8,12 +8,12 @@ import dataclasses
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import norm
 
 from fitmat.fitting.information import MISSES
 from fitmat.fitting.losses import bad_probability
 from fitmat.fitting.result import Fit
 from fitmat.judgement.prediction import standardised_residuals
+from fitmat.maths import normal
 from fitmat.maths.directions import signed_zenith
 from fitmat.measurements.noise import leave_one_out
 
@@ -111,7 +111,7 @@ def _contradictions(fit: Fit) -> list[str]:
         if apart.size and apart.max() > worst:
             worst, at = float(apart.max()), int(apart.argmax())
             where = int(a[at]), int(b[at])
-    if pairs == 0 or worst <= norm.isf(CHANCE / (2 * pairs)):
+    if pairs == 0 or worst <= -normal.quantile(CHANCE / (2 * pairs)):
         return []
     give = "the wrong one little weight."
     advice = f"The loss {fit.loss.name} gives {give}" if fit.loss.robust else f"--loss student-t gives {give}"
@@ -173,7 +173,7 @@ def _bad_values(fit: Fit, clashes: list[str]) -> list[str]:
         bad = weight & (bad_probability(z) > 0.5)
         limit = "probably bad"
     else:
-        bad = np.abs(z) > norm.isf(CHANCE / (2 * max(fit.n_values, 1)))
+        bad = np.abs(z) > -normal.quantile(CHANCE / (2 * max(fit.n_values, 1)))
         limit = "further from it than noise and misfit explain"
     count = int(np.count_nonzero(bad))
     if count == 0 or clashes or (fit.misfit_ratio >= MISSES and not fit.loss.robust):

@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from fitmat.fitting.likelihood import log_pointwise
 from fitmat.judgement.prediction import predictions
+from fitmat.uncertainty.pareto import leave_one_out
 from fitmat.uncertainty.posterior import GOOD_PARETO, Posterior
 
 LEFT_OUT_DRAWS = 1000
@@ -40,8 +41,6 @@ class Evidence:
 
 def weigh(posterior: Posterior) -> Evidence | None:
     """PSIS-LOO of a posterior (Vehtari, Gelman & Gabry 2017, eq. 10); None above `MOST_LEFT_OUT` values."""
-    from arviz_stats.base.array import array_stats
-
     fit = posterior.fit
     used = np.asarray(fit.data.weight) > 0
     if int(used.sum()) > MOST_LEFT_OUT or fit.n_values > MOST_LEFT_OUT:
@@ -52,7 +51,6 @@ def weigh(posterior: Posterior) -> Evidence | None:
         logs[part] = log_pointwise(x, noise, data, spread)[:, used]
     d = posterior.diagnostics
     independent = 1.0 if d is None else float(np.clip(np.nanmin(d.ess) / len(s), 0.01, 1.0))
-    elpd, k, p_loo = array_stats.loo(logs.T[:, None, :], r_eff=independent)
-    elpd, k = np.asarray(elpd), np.asarray(k)
+    elpd, k, p_loo = leave_one_out(logs, independent)
     spread = float(np.sqrt(elpd.size) * elpd.std())
-    return Evidence(float(elpd.sum()), spread, float(np.sum(p_loo)), float(np.mean(k > GOOD_PARETO)), elpd)
+    return Evidence(float(elpd.sum()), spread, p_loo, float(np.mean(k > GOOD_PARETO)), elpd)

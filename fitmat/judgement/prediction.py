@@ -8,12 +8,12 @@ from collections.abc import Iterator
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import ndtri
 
 from fitmat.fitting.likelihood import misfits
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.result import Fit
 from fitmat.fitting.stabilising import from_stabilised, stabilised
+from fitmat.maths import normal
 from fitmat.maths.directions import from_angles
 from fitmat.measurements.samples import Measurements
 from fitmat.models.around.noise import Noisy
@@ -102,7 +102,7 @@ def predictive_band(posterior: Posterior, rows: np.ndarray) -> Float[np.ndarray,
     limits = np.empty((2, *noise.shape))
     for part in slices(len(rows), at_once):
         x = values(fit.model, draws, m.wi[part], m.wo[part]) * kappa[part]
-        new = replicated(x, noise[part], s[:, None, None], ndtri(levels)[:, None, None])
+        new = replicated(x, noise[part], s[:, None, None], normal.quantile(levels)[:, None, None])
         limits[:, part] = np.quantile(new, [0.025, 0.975], axis=0)
     return limits / kappa
 

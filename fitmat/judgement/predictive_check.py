@@ -6,7 +6,6 @@ It fits nothing and compares no models: a model may be the best of all and still
 import dataclasses
 
 import numpy as np
-from scipy.special import log_ndtr
 
 from fitmat.errors import FitmatError
 from fitmat.fitting.likelihood import misfits
@@ -15,6 +14,7 @@ from fitmat.fitting.result import Fit
 from fitmat.judgement.multiplicity import adjusted_for_many
 from fitmat.judgement.prediction import predictions
 from fitmat.judgement.predictive_statistics import Replicates, Statistic
+from fitmat.maths import normal
 from fitmat.measurements.incidences import incidences
 from fitmat.text import html_table, text_table
 from fitmat.uncertainty.posterior import Posterior
@@ -138,6 +138,6 @@ def _seen(
     for part, x, noise, spread in predictions(fit, draws, s):
         at, above = (data.loss.transform(f, noise, data.kappa, spread) for f in (x, top[:, None] * data.kappa))
         found[0, part] = misfits(x, noise, data, spread)
-        found[1, part] = np.where(data.weight > 0, log_ndtr(above - at), 0.0)
+        found[1, part] = np.where(data.weight > 0, normal.log_cdf(above - at), 0.0)
         found[2, part], found[3, part] = x, noise
     return found[0], found[1], found[2], found[3]

@@ -5,14 +5,13 @@ It judges one number at a time; `predictive_check` joins them and says what they
 
 import dataclasses
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from scipy import stats
 
 from fitmat.fitting.result import Fit
 from fitmat.judgement.prediction import replicated
+from fitmat.maths import binomial, normal
 from fitmat.measurements.incidences import Incidence
 from fitmat.measurements.noise import curves
 
@@ -94,14 +93,14 @@ class Replicates:
         """The largest residual, and how many are beyond 2 sd."""
         z, n = np.abs(self.z[:, self.used]), int(self.used.sum())
         largest = z.max(axis=1)
-        tail = -np.expm1(n * np.log1p(-2.0 * stats.norm.sf(largest)))
-        ends = stats.norm.isf(-np.expm1(np.log([0.025, 0.975]) / n) / 2.0)
+        tail = -np.expm1(n * np.log1p(-2.0 * normal.cdf(-largest)))
+        ends = -normal.quantile(-np.expm1(np.log([0.025, 0.975]) / n) / 2.0)
         yield _statistic("largest", "everywhere", largest.mean(), ends, tail, 1.0 - tail)
         count = (z > 2.0).sum(axis=1)
-        chance: Any = stats.binom(n, 2.0 * stats.norm.sf(2.0))
-        half = 0.5 * chance.pmf(count)
-        above, under = chance.sf(count) + half, chance.cdf(count) - half
-        yield _statistic("outliers", "everywhere", count.mean() / n, chance.ppf([0.025, 0.975]) / n, above, under)
+        chance = binomial.masses(n, 2.0 * float(normal.cdf(-2.0)))
+        half, to, since = 0.5 * chance[count], np.cumsum(chance), np.cumsum(chance[::-1])[::-1]
+        ends = np.searchsorted(to, [0.025, 0.975]) / n
+        yield _statistic("outliers", "everywhere", count.mean() / n, ends, since[count] - half, to[count] - half)
 
     def peaks(self, highest: np.ndarray, s: np.ndarray) -> Iterator[Statistic]:
         """The highest value of each incidence; its expected range is sought among the brightest directions only."""
@@ -131,7 +130,7 @@ class Replicates:
     def _pair_sum(self, pairs: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """P(Σ ε ε′ > t) over the pairs, ε N(0, 1): of mean 0 and variance their number."""
         if len(pairs) >= MANY_PAIRS:
-            return lambda t: stats.norm.sf(t / np.sqrt(len(pairs)))
+            return lambda t: normal.cdf(-t / np.sqrt(len(pairs)))
         places = pairs[:, :2] * self.z.shape[2] + pairs[:, 2:]
         which, index = np.unique(places, return_inverse=True)
         index = index.reshape(places.shape)
@@ -155,7 +154,7 @@ class Replicates:
                 if n < ENOUGH:
                     continue
                 mean = self.z[:, rows].sum(axis=(1, 2)) / n
-                above = stats.norm.sf(mean * np.sqrt(n))
+                above = normal.cdf(-mean * np.sqrt(n))
                 ends = np.array([-1.96, 1.96]) / np.sqrt(n)
                 yield _statistic("side", f"{group.name} {name}", mean.mean(), ends, above, 1.0 - above)
 

@@ -20,6 +20,9 @@ from fitmat.uncertainty.estimate import Estimate, band, estimate
 AZIMUTHS = 4
 """Azimuths of incidence over half a turn, where a model is anisotropic."""
 
+COARSE = (ZENITH_NODES // 2, AZIMUTH_NODES // 2)
+"""Nodes behind the spread of the draws; the best fits are integrated with all nodes."""
+
 ANGLES = np.deg2rad(np.arange(0.0, 86.0, 5.0))
 """Incidence angles of all curves against incidence, radians."""
 
@@ -70,7 +73,10 @@ def measure_distances(
     nodes = np.concatenate([theta, measured, ANGLES])
     over, at, curves = np.split(np.arange(len(nodes)), [len(theta), len(theta) + len(measured)])
     pair = surfaces(first, draws[0]), surfaces(second, draws[1])
-    top, bottom, albedos = _integrals(pair, nodes)
+    every = [widths(*part) for part in pair]
+    of_lobe = min(w.min() for w in every), every[1][0]
+    best = _integrals(_first(pair), nodes, of_lobe, (ZENITH_NODES, AZIMUTH_NODES))
+    top, bottom, albedos = _spread_about(best, _integrals(pair, nodes, of_lobe, COARSE))
     result: dict[str, dict] = {key: {} for key in ("whole", "by_region", "share", "by_incidence", "both")}
     for k, (name, metric) in enumerate(METRICS.items()):
         t, b = (part[:, over, k] * incidence_weight(metric, theta, solid)[:, None] for part in (top, bottom))
@@ -119,21 +125,48 @@ def _at_node(metric: Metric, top: np.ndarray, bottom: np.ndarray, theta: np.ndar
     return kept * factor * _over_nodes(metric, top, bottom)
 
 
+Integrals = tuple[Float[np.ndarray, "d k m r"], Float[np.ndarray, "d k m r"], Float[np.ndarray, "d k 2"]]
+
+
+def _first(pair: tuple[Draws, Draws]) -> tuple[Draws, Draws]:
+    """The best fits alone."""
+    (one, first), (other, second) = pair
+    return (one, first[:1]), (other, second[:1])
+
+
+def _spread_about(best: Integrals, draws: Integrals) -> Integrals:
+    """Integrals of draws by a coarse rule, each by as much too large or small as that of the best fit was."""
+
+    def corrected(exact: np.ndarray, coarse: np.ndarray) -> np.ndarray:
+        usable = (coarse[:1] > 0) & (exact > 0)
+        return np.where(usable, coarse * exact / np.where(usable, coarse[:1], 1.0), coarse + exact - coarse[:1])
+
+    top, bottom, albedos = (corrected(*parts) for parts in zip(best, draws, strict=True))
+    return np.maximum(top, 0.0), np.maximum(bottom, 0.0), albedos
+
+
 def _integrals(
-    pair: tuple[Draws, Draws], theta_i: Float[np.ndarray, " k"]
-) -> tuple[Float[np.ndarray, "d k m r"], Float[np.ndarray, "d k m r"], Float[np.ndarray, "d k 2"]]:
-    """∫ |t(f₁) − t(f₂)|ᵖ w and ∫ w (or ∫ f₂² w) over ω_o: draw, incidence, metric, region; and both albedos."""
-    every = [widths(*part) for part in pair]
-    rules = lobe_rules(theta_i, min(w.min() for w in every), isotropic=all(model.isotropic for model, _ in pair))
+    pair: tuple[Draws, Draws], theta_i: Float[np.ndarray, " k"], of_lobe: tuple[float, float], nodes: tuple[int, int]
+) -> Integrals:
+    """∫ |t(f₁) − t(f₂)|ᵖ w and ∫ w (or ∫ f₂² w) over ω_o: draw, incidence, metric, region; and both albedos.
+
+    Args:
+        pair: Both models with their draws.
+        theta_i: Incidences in radians.
+        of_lobe: Width of the narrowest lobe of all draws, which the rule resolves, and that which makes the regions.
+        nodes: Of the rule over ω_o.
+    """
+    isotropic = all(model.isotropic for model, _ in pair)
+    rules = lobe_rules(theta_i, of_lobe[0], isotropic=isotropic, nodes=nodes)
     turns = len(rules) // len(theta_i)
-    inside = [memberships(rule.wi, rule.wo, every[1][0]) for rule in rules]
-    shape = len(every[0]), len(theta_i), len(METRICS), len(REGIONS)
+    weights = [_weights(rule, memberships(rule.wi, rule.wo, of_lobe[1])) for rule in rules]
+    shape = len(pair[0][1]), len(theta_i), len(METRICS), len(REGIONS)
     top, bottom, albedos = np.zeros(shape), np.zeros(shape), np.zeros((*shape[:2], 2))
     for rows, k, (one, two) in blocks(pair, [(rule.wi, rule.wo) for rule in rules]):
         place = k // turns
-        for m, (t, b) in enumerate(_terms(rules[k], inside[k], one, two)):
-            top[rows, place, m] += t / turns
-            bottom[rows, place, m] += b / turns
+        t, b = _terms(rules[k], weights[k], one, two)
+        top[rows, place] += t.transpose(1, 0, 2) / turns
+        bottom[rows, place] += b.transpose(1, 0, 2) / turns
         albedos[rows, place] += np.stack([f.mean(axis=2) @ rules[k].weight for f in (one, two)], axis=1) / turns
     return top, bottom, albedos
 
@@ -157,22 +190,37 @@ def lobe_rules(
     return [lobe_rule(theta, width, phi_i=turn, nodes=nodes) for theta in theta_i for turn in turns]
 
 
+WEIGHTS = tuple(dict.fromkeys(metric.weight for metric in METRICS.values()))
+"""Weights of ω_o that metrics have."""
+
+
+def _weights(rule: Rule, inside: Float[np.ndarray, "m r"]) -> Float[np.ndarray, "m w r"]:
+    """Each of `WEIGHTS` at the nodes of a rule, by region."""
+    every = {metric.weight: metric for metric in METRICS.values()}
+    return np.stack([direction_weight(every[name], rule)[:, None] * inside for name in WEIGHTS], axis=1)
+
+
 def _terms(
-    rule: Rule, inside: Float[np.ndarray, "m r"], one: Float[np.ndarray, "d m c"], two: Float[np.ndarray, "d m c"]
-) -> list[tuple[Float[np.ndarray, "d r"], Float[np.ndarray, " r"]]]:
+    rule: Rule, weights: Float[np.ndarray, "m w r"], one: Float[np.ndarray, "d m c"], two: Float[np.ndarray, "d m c"]
+) -> tuple[Float[np.ndarray, "k d r"], Float[np.ndarray, "k d r"]]:
     """T and V, or ∫ f₂² w, of every metric by region, channel means."""
-    ci, co = rule.wi[2], rule.wo[:, 2:]
-    transforms = {metric.transform for metric in METRICS.values()}
-    apart = {t: t(one, ci, co) - t(two, ci, co) for t in transforms}
-    mean = {t: (difference**2).mean(axis=2) for t, difference in apart.items()}
-    found = []
+    ci, co, flat = rule.wi[2], rule.wo[:, 2:], weights.reshape(len(weights), -1)
+
+    def summed(term: Float[np.ndarray, "d m c"]) -> Float[np.ndarray, "w d r"]:
+        found = sum(term[:, :, channel] @ flat for channel in range(term.shape[2])) / term.shape[2]
+        return np.asarray(found).reshape(len(term), *weights.shape[1:]).transpose(1, 0, 2)
+
+    apart = {t: t(one, ci, co) - t(two, ci, co) for t in {metric.transform for metric in METRICS.values()}}
+    squares = {t: summed(difference**2) for t, difference in apart.items()}
+    lights = {m.transform: summed(np.abs(apart[m.transform])) for m in METRICS.values() if m.kind == "light"}
+    square = summed(two**2)
+    solid = np.broadcast_to(weights.sum(axis=0)[:, None], square.shape)
+    top, bottom = [], []
     for metric in METRICS.values():
-        light = metric.kind == "light"
-        term = np.abs(apart[metric.transform]).mean(axis=2) if light else mean[metric.transform]
-        weight = direction_weight(metric, rule)[:, None] * inside
-        norm = (two**2).mean(axis=2) @ weight if metric.kind == "relative" else weight.sum(axis=0)
-        found.append((term @ weight, norm))
-    return found
+        place = WEIGHTS.index(metric.weight)
+        top.append((lights if metric.kind == "light" else squares)[metric.transform][place])
+        bottom.append((square if metric.kind == "relative" else solid)[place])
+    return np.stack(top), np.stack(bottom)
 
 
 def direction_weight(metric: Metric, rule: Rule) -> Float[Any, " m"]:

@@ -5,7 +5,7 @@ Judges two fits; draws nothing and prints nothing.
 
 import dataclasses
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -14,6 +14,7 @@ from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
 from fitmat.match import sentences
 from fitmat.match.ablation import Ablation, ablate
+from fitmat.match.appearance.spheres import Perceived, perceived
 from fitmat.match.discernibility import Telling, tell_apart
 from fitmat.match.distances import ANGLES, Distances, PairedDraws, measure_distances
 from fitmat.match.imitation import Imitation, imitate
@@ -25,9 +26,6 @@ from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
 from fitmat.models.registry import LOBES, lobe_names
 from fitmat.uncertainty.estimate import Estimate, band, estimate
 from fitmat.uncertainty.posterior import Posterior
-
-if TYPE_CHECKING:
-    from fitmat.match.appearance.spheres import Perceived
 
 MATCH_DRAWS = 100
 """Posterior draws behind every interval of the match."""
@@ -100,7 +98,7 @@ class Match:
     distances: Distances
     ablation: Ablation | None
     telling: Telling
-    perceived: "Perceived | None"
+    perceived: Perceived | None
     imitations: tuple[Imitation, ...]
 
     @property
@@ -153,7 +151,9 @@ def is_microfacet(name: str) -> bool:
     return any(LOBES[part].kind == "microfacet" for part in lobe_names(name))
 
 
-def compare(one: Posterior, other: Posterior, *, spheres: bool = True, imitations: bool = False) -> Match:
+def compare(
+    one: Posterior, other: Posterior, *, spheres: bool = True, imitations: bool = False, pictures: bool = False
+) -> Match:
     """The match between an empirical and a microfacet model, in either order.
 
     Args:
@@ -161,6 +161,7 @@ def compare(one: Posterior, other: Posterior, *, spheres: bool = True, imitation
         other: Posterior of the other fit to the same measurements.
         spheres: Whether to ask what an eye would see of the difference.
         imitations: Whether to ask for the parameters with which each of the two best imitates the other.
+        pictures: Whether to make pictures of the spheres.
 
     Returns:
         A `Match`; intervals come from independent draws of both posteriors.
@@ -180,7 +181,7 @@ def compare(one: Posterior, other: Posterior, *, spheres: bool = True, imitation
         measuring = pool.submit(measure_distances, *models, draws=draws, measured=measured)
         ablating = pool.submit(ablate, *models, draws=few)
         telling = pool.submit(tell_apart, *fits, draws=few)
-        seeing = pool.submit(_perceived, *fits, draws=draws) if spheres else None
+        seeing = pool.submit(_perceived, *fits, draws, pictures) if spheres else None
         imitating = pool.map(lambda pair: _imitated(*pair), (fits[::-1], fits)) if imitations else ()
         parts = {"ablation": ablating.result(), "telling": telling.result(), "perceived": seeing and seeing.result()}
         parts["imitations"] = tuple(found for each in imitating for found in each)
@@ -237,10 +238,8 @@ def _concluded(pair: tuple[Posterior, Posterior], found: Distances, **parts: Any
     )
 
 
-def _perceived(empirical: Fit, microfacet: Fit, draws: PairedDraws) -> "Perceived":
-    from fitmat.match.appearance.spheres import perceived  # loads colour-science
-
-    return perceived(empirical.model, microfacet.model, draws, empirical.measurements.channels)
+def _perceived(empirical: Fit, microfacet: Fit, draws: PairedDraws, pictures: bool) -> Perceived:
+    return perceived(empirical.model, microfacet.model, draws, empirical.measurements.channels, pictures=pictures)
 
 
 def _paired(empirical: Posterior, microfacet: Posterior) -> PairedDraws:

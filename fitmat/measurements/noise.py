@@ -7,7 +7,6 @@ import dataclasses
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import minimize, nnls
 
 from fitmat.measurements.samples import IN_PLANE, Measurements
 
@@ -116,6 +115,8 @@ def levels(m: Measurements) -> Float[np.ndarray, "n c"]:
 
 def noise_law(value: Float[np.ndarray, " n"], sigma: Float[np.ndarray, " n"]) -> tuple[float, float]:
     """a (sr⁻¹) and b of σ² = a² + (b f)² by non-negative least squares on relative residuals; a is never 0."""
+    from scipy.optimize import nnls
+
     unit = float(sigma.max())
     value, sigma = value / unit, sigma / unit
     squares = np.stack([np.ones_like(value), value**2], axis=1) / sigma[:, None] ** 2
@@ -193,6 +194,8 @@ def _lagrange(nodes: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 def components(error: np.ndarray, level: np.ndarray, factor: np.ndarray) -> tuple[float, float]:
     """a (sr⁻¹) and b (relative) of σ² = a² + (b f)² by maximum likelihood under a t distribution."""
+    from scipy.optimize import minimize
+
     typical = np.median(np.abs(error)) / 0.6745 + 1e-300
     relative = np.median(np.abs(error) / np.maximum(level, 1e-300)) / 0.6745 + 1e-12
 

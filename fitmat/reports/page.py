@@ -8,12 +8,11 @@ import io
 import json
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jinja2
 import numpy as np
 from markupsafe import Markup
-from matplotlib.figure import Figure
 
 from fitmat import files
 from fitmat.fitting.result import RESULTS, Fit
@@ -25,13 +24,14 @@ from fitmat.match.discernibility import SEPARATED
 from fitmat.match.match import Match
 from fitmat.match.regions import GRAZING_DEG, REGIONS
 from fitmat.match.sentences import CLOSE, SIMILAR
-from fitmat.measurements.samples import Measurements
 from fitmat.models.metrics import METRICS
-from fitmat.reports import plot
 from fitmat.reports.rows import parameter_rows, prior_rows
 from fitmat.studies import record
 from fitmat.studies.study import Study
 from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS, Posterior
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 DPI = 96
 CHANNELS_DRAWN = 3
@@ -74,6 +74,8 @@ def to_html(study: Study) -> str:
     )
     environment.filters |= {"png": _png, "subscripted": _subscripted}
     findings = study.findings
+    from fitmat.reports import plot  # loads matplotlib
+
     return environment.get_template("report.html").render(
         version=version("fitmat"),
         study=study,
@@ -86,22 +88,25 @@ def to_html(study: Study) -> str:
         results=RESULTS,
         verdicts=VERDICTS,
         curves=_curve_figures(study),
-        residuals=plot.residual_figure(study, _drawn(study.measurements)),
+        residuals=plot.residual_figure(study, _drawn(study)) if study.full else None,
         enough={"tau": ENOUGH_TAU, "ess": ENOUGH_ESS, "rhat": GOOD_RHAT},
-        corners=[(p.fit.name, plot.corner(p)) for p in study.posteriors if _has_posterior(p)],
-        **_match_parts(study.match),
-        **_choice_parts(study.choice),
+        corners=[(p.fit.name, plot.corner(p)) for p in study.posteriors if study.full and _has_posterior(p)],
+        **_match_parts(study.match, study.full),
+        **_choice_parts(study.choice, study.full),
         identified=[found.identifiability for found in findings if found.identifiability is not None],
         checks=[found.check for found in findings if found.check is not None],
         opinions=[found.second_opinion for found in findings if found.second_opinion is not None],
     )
 
 
-def _match_parts(match: Match | None) -> dict[str, Any]:
+def _match_parts(match: Match | None, full: bool) -> dict[str, Any]:
     """What the template says of the match, with its pictures."""
     if match is None:
         return {"match": None}
+    from fitmat.reports import plot
+
     seen = match.perceived
+    drawn = seen is not None and all(lighting.pictures is not None for lighting in seen.lightings)
     return {
         "match": match,
         "albedo": plot.albedo(match).figure,
@@ -113,21 +118,23 @@ def _match_parts(match: Match | None) -> dict[str, Any]:
         "separated": SEPARATED,
         "explains": EXPLAINS,
         "grazing_deg": GRAZING_DEG,
-        "distances_figure": plot.distances(match).figure,
-        "ablation_figure": None if match.ablation is None else plot.ablation(match.ablation).figure,
-        "telling_figure": plot.telling(match.telling).figure if match.telling.known else None,
+        "distances_figure": plot.distances(match).figure if full else None,
+        "ablation_figure": plot.ablation(match.ablation).figure if full and match.ablation is not None else None,
+        "telling_figure": plot.telling(match.telling).figure if full and match.telling.known else None,
         "perceived": seen,
-        "spheres": None if seen is None else plot.spheres(seen),
+        "spheres": plot.spheres(seen) if drawn and seen is not None else None,
         "just_noticeable": JUST_NOTICEABLE,
         "clearly_visible": CLEARLY_VISIBLE,
         "white_luminance": WHITE_LUMINANCE,
     }
 
 
-def _choice_parts(choice: Choice | None) -> dict[str, Any]:
+def _choice_parts(choice: Choice | None, full: bool) -> dict[str, Any]:
     """What the template says of the choice, with its pictures."""
-    if choice is None:
-        return {"choice": None}
+    if choice is None or not full:
+        return {"choice": choice}
+    from fitmat.reports import plot
+
     predicted = any(c.left_out is not None for c in choice.candidates)
     return {
         "choice": choice,
@@ -147,16 +154,20 @@ def _left_out(fit: Fit) -> str:
     return f"{count} values left out: {fit.loss.unusable}." if fit.loss.usable is not None and count > 0 else ""
 
 
-def _curve_figures(study: Study) -> list[tuple[str, Figure]]:
+def _curve_figures(study: Study) -> list[tuple[str, "Figure"]]:
     """The curves of every channel that is drawn, by its name; none without a section."""
-    m = study.measurements
-    drawn = _drawn(m) if study.findings[0].curves else []
-    return [(m.channels[channel], plot.curves(study, channel=channel)) for channel in drawn]
+    from fitmat.reports import plot
+
+    drawn = _drawn(study) if study.findings[0].curves else []
+    return [(study.measurements.channels[channel], plot.curves(study, channel=channel)) for channel in drawn]
 
 
-def _drawn(m: Measurements) -> list[int]:
-    """The channels that are drawn: at most `CHANNELS_DRAWN`, evenly spread."""
-    return [int(k) for k in np.unique(np.linspace(0, len(m.channels) - 1, CHANNELS_DRAWN).astype(int))]
+def _drawn(study: Study) -> list[int]:
+    """The channels that are drawn: at most `CHANNELS_DRAWN`, evenly spread, or only the middle one."""
+    last = len(study.measurements.channels) - 1
+    if not study.full:
+        return [last // 2]
+    return [int(k) for k in np.unique(np.linspace(0, last, CHANNELS_DRAWN).astype(int))]
 
 
 def _subscripted(symbol: str) -> Markup:
@@ -165,7 +176,7 @@ def _subscripted(symbol: str) -> Markup:
     return Markup("{}<sub>{}</sub>").format(letter, below) if below else Markup("{}").format(symbol)
 
 
-def _png(figure: Figure) -> str:
+def _png(figure: "Figure") -> str:
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=DPI, bbox_inches="tight")
+    figure.savefig(buffer, format="png", dpi=DPI)
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

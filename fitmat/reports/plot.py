@@ -7,10 +7,10 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
-from corner import corner as corner_plot
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from fitmat.errors import FitmatError
 from fitmat.judgement.choice import SMALL, Choice
 from fitmat.match.ablation import Ablation
 from fitmat.match.appearance.spheres import Perceived
@@ -38,11 +38,14 @@ def curves(study: Study, *, channel: int = 0) -> Figure:
     along = range(len(study.findings[0].curves))
     columns = 2 if len(along) in (2, 4) else min(3, len(along))
     lines = -(-len(along) // columns)
-    figure = Figure(figsize=(max(3.6 * columns, 5.0), 2.7 * lines + 0.3), layout="constrained")
+    width, height = max(3.6 * columns, 5.0), 2.7 * lines + 0.3
+    figure = Figure(figsize=(width, height))
+    # Set by hand: to let Matplotlib find the margins takes twice as long as all the rest.
+    figure.subplots_adjust(0.75 / width, 0.5 / height, 1 - 0.15 / width, 1 - 0.6 / height, 0.33, 0.42)
     for k in along:
         section(study, k, channel=channel, ax=figure.add_subplot(lines, columns, k + 1))
     handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), fontsize=9, frameon=False)
+    figure.legend(handles, labels, loc="upper center", ncols=len(labels), fontsize=9, frameon=False)
     return figure
 
 
@@ -219,14 +222,18 @@ def left_out(choice: Choice, *, most: int = 4, ax: Axes | None = None) -> Axes:
 
 def spheres(perceived: Perceived) -> Figure:
     """Both models' spheres, and below them where an eye sees a difference; one column for each lighting."""
+    drawn = [lighting.pictures for lighting in perceived.lightings]
+    if any(pictures is None for pictures in drawn):
+        raise FitmatError("there are no pictures of the spheres: ask for them, fitmat.compare(…, pictures=True).")
     rows, count = (*perceived.names, "difference"), len(perceived.lightings)
     figure = Figure(figsize=(1.35 * count + 0.9, 4.3), layout="constrained")
     axes = figure.subplots(3, count, squeeze=False)
-    for k, lighting in enumerate(perceived.lightings):
-        for ax, picture in zip(axes[:, k], (lighting.empirical, lighting.microfacet), strict=False):
+    for k, (lighting, pictures) in enumerate(zip(perceived.lightings, drawn, strict=True)):
+        assert pictures is not None
+        for ax, picture in zip(axes[:, k], (pictures.empirical, pictures.microfacet), strict=False):
             seen = np.isfinite(picture).all(axis=2, keepdims=True)
             ax.imshow(np.concatenate([np.where(seen, picture, 0.0), seen], axis=2))
-        axes[2, k].imshow(lighting.difference, cmap="magma", vmin=0.0, vmax=MOST_DRAWN)
+        axes[2, k].imshow(pictures.difference, cmap="magma", vmin=0.0, vmax=MOST_DRAWN)
         axes[0, k].set_title(lighting.name, fontsize=8)
         axes[2, k].set_xlabel(f"ΔE2000 {lighting.delta_e_2000.mean.value:.1f} on average", fontsize=7)
     for label, ax in zip(rows, axes[:, 0], strict=True):
@@ -244,6 +251,8 @@ def spheres(perceived: Perceived) -> Figure:
 
 def corner(posterior: Posterior) -> Figure:
     """Every free parameter against every other, with the best fit marked; fixed ones are left out."""
+    from corner import corner as corner_plot  # loads scipy
+
     fit = posterior.fit
     symbols = [e.param.symbol for e in fit.entries for _ in range(e.size)]
     columns, labels = list(fit.coordinates.places), []

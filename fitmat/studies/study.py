@@ -50,11 +50,13 @@ class Study:
         findings: One for each model, in the order of the fits.
         match: Of an empirical and a microfacet model among them; None where there is no such pair.
         choice: Which model the data prefer; None under a loss that weighs no models, and of a single model.
+        full: Whether everything was asked; see `study`.
     """
 
     findings: tuple[Findings, ...]
     match: Match | None = None
     choice: Choice | None = None
+    full: bool = False
 
     @property
     def measurements(self) -> Measurements:
@@ -86,6 +88,7 @@ def study(
     sampling: bool = True,
     seed: int = 0,
     second_opinion: bool = False,
+    full: bool = False,
     resume: Path | None = None,
     progress: Progress | None = None,
 ) -> Study:
@@ -103,6 +106,9 @@ def study(
         sampling: Whether to sample; else, and for more than `MOST_SAMPLED` values, Laplace's approximation.
         seed: Of everything that is drawn.
         second_opinion: Whether to sample every posterior a second time with another method.
+        full: Whether to ask what takes longer than it tells at first sight as well: the parameters with which each
+            model of the match best imitates the other, pictures of the spheres, and of two models what each predicts
+            of single values left out.
         resume: Folder in which the sampling is kept while it lasts; None to keep nothing.
         progress: Called with what is done next.
 
@@ -128,7 +134,7 @@ def study(
         first = _pass_over(stream, jobs, seed, say)
     walking = sampling and first[0].fit.loss.posterior and first[0].fit.n_values <= MOST_SAMPLED
     posteriors = _sample_each(first, seed, resume, say) if walking else first
-    return judge(posteriors, seed=seed, second_opinion=second_opinion, progress=say)
+    return judge(posteriors, seed=seed, second_opinion=second_opinion, full=full, progress=say)
 
 
 def _as_stream(measurements: Measurements | Stream) -> Measurements | Stream:
@@ -196,7 +202,12 @@ def _resumable(approximate: Posterior, seed: int, kept: Path) -> int:
 
 
 def judge(
-    posteriors: Sequence[Posterior], *, seed: int, second_opinion: bool = False, progress: Progress | None = None
+    posteriors: Sequence[Posterior],
+    *,
+    seed: int,
+    second_opinion: bool = False,
+    full: bool = False,
+    progress: Progress | None = None,
 ) -> Study:
     """Match, weigh and examine posteriors of fits to the same measurements.
 
@@ -204,16 +215,18 @@ def judge(
         posteriors: By `sample` or `laplace`.
         seed: Of the replicated data and of the second sampler.
         second_opinion: Whether to sample chains a second time with another method.
+        full: As in `study`.
         progress: Called with what is done next.
     """
     say = progress or (lambda *_: None)
     say("comparing", 0, 0)
-    match = _match(posteriors)
+    match = _match(posteriors, full)
     usable = [p for p in posteriors if p.fit.finite and p.fit.loss.posterior]
     choice = None
     if len(usable) > 1:
         say("weighing the models", 0, 0)
-        choice = choose(usable, predicting=usable[0].fit.n_values == usable[0].fit.measurements.n_valid)
+        whole = usable[0].fit.n_values == usable[0].fit.measurements.n_valid
+        choice = choose(usable, predicting=whole, singly=full or len(usable) > 2)
     along = sections(posteriors[0].fit.measurements)
     looked_at = _detailed(usable, match, choice)
     findings = []
@@ -221,7 +234,7 @@ def judge(
         say(f"examining {posterior.fit.name}", 0, 0)
         found = find(posterior, along)
         findings.append(_examined(found, seed, second_opinion, say) if posterior in looked_at else found)
-    return Study(tuple(findings), match, choice)
+    return Study(tuple(findings), match, choice, full)
 
 
 def _examined(found: Findings, seed: int, second_opinion: bool, say: Progress) -> Findings:
@@ -235,13 +248,13 @@ def _examined(found: Findings, seed: int, second_opinion: bool, say: Progress) -
     return dataclasses.replace(found, identifiability=identify(posterior), check=check, second_opinion=opinion)
 
 
-def _match(posteriors: Sequence[Posterior]) -> Match | None:
+def _match(posteriors: Sequence[Posterior], full: bool) -> Match | None:
     """The match of the first empirical and the first microfacet model, if there are both and both are finite."""
     empirical = next((p for p in posteriors if is_empirical(p.fit.name)), None)
     microfacet = next((p for p in posteriors if is_microfacet(p.fit.name) and not is_empirical(p.fit.name)), None)
     if empirical is None or microfacet is None or not (empirical.fit.finite and microfacet.fit.finite):
         return None
-    found = compare(empirical, microfacet, imitations=True)
+    found = compare(empirical, microfacet, imitations=full, pictures=full)
     return found if np.isfinite(found.hemisphere_distance.value) else None
 
 

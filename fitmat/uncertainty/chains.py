@@ -4,7 +4,10 @@ This is the only room that imports emcee.
 """
 
 import dataclasses
+import importlib
 import importlib.metadata
+import sys
+import types
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +22,13 @@ from fitmat.uncertainty.density import log_posterior, physical
 from fitmat.uncertainty.laplace import draws, independent_proposal, laplace
 from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAU, Diagnostics, Posterior, split_rhat
 
-WALKERS = 64
-"""Of the ensemble; four for each dimension where there are more than sixteen."""
+WALKERS = 40
+"""Of the ensemble; four for each dimension where there are more than ten."""
 
 CHUNK = 50
-"""Steps between looks at the autocorrelation time."""
+"""Most steps between looks at the autocorrelation time."""
 
-SHORTEST = 250
+SHORTEST = 150
 """Steps that every chain has, however short its autocorrelation time."""
 
 MAX_STEPS = 8_000
@@ -75,7 +78,7 @@ def sample(
     interrupted = False
     try:
         while (done := sampler.iteration) < min(goal, max_steps):
-            state = sampler.run_mcmc(state, min(CHUNK, max_steps - done), skip_initial_state_check=True)
+            state = sampler.run_mcmc(state, min(CHUNK, min(goal, max_steps) - done), skip_initial_state_check=True)
             if sampler.iteration >= SHORTEST:
                 goal = max(goal, _steps_needed(sampler))
             if kept is not None:
@@ -109,10 +112,28 @@ def resumable_steps(
     return 0 if saved is None else len(saved.chain)
 
 
+def _emcee() -> Any:
+    """emcee, without `scipy.stats`, which takes it a second to load for a move that is not used here.
+
+    The move stays usable: what it needs of scipy is loaded when it is called.
+    """
+    if "emcee" not in sys.modules and "scipy.stats" not in sys.modules:
+        later = types.ModuleType("scipy.stats")
+        later.__dict__["gaussian_kde"] = lambda *args: importlib.import_module("scipy.stats").gaussian_kde(*args)
+        scipy = types.ModuleType("scipy") if "scipy" not in sys.modules else None
+        stand_ins = {"scipy.stats": later} | ({} if scipy is None else {"scipy": scipy})
+        sys.modules.update(stand_ins)
+        try:
+            return importlib.import_module("emcee")
+        finally:
+            for name in stand_ins:
+                del sys.modules[name]
+    return importlib.import_module("emcee")
+
+
 def _ensemble(fit: Fit, seed: int, walkers: int | None) -> tuple[Any, Any]:
     """The sampler, and the state in which a run begins."""
-    import emcee
-
+    emcee = _emcee()
     if not fit.finite:
         raise FitmatError(f"{fit.name}: the fit ended {fit.result}, there is nothing to sample; check the data.")
     if not fit.loss.posterior:
@@ -144,8 +165,7 @@ def _run(fit: Fit, state: Any, seed: int, max_steps: int) -> bytes:
 
 def _resumed(sampler: Any, saved: Saved) -> Any:
     """The state in which a run goes on, its past given back to the sampler."""
-    import emcee
-
+    emcee = _emcee()
     past = sampler.backend
     past.chain, past.log_prob, past.accepted = saved.chain, saved.log_prob, saved.accepted
     past.iteration, past.random_state = len(saved.chain), saved.random_state

@@ -18,6 +18,7 @@ from fitmat.fitting.information import inverse_information
 from fitmat.fitting.result import Fit
 from fitmat.measurements.samples import Measurements
 from fitmat.uncertainty.density import log_posterior, physical
+from fitmat.uncertainty.pareto import smoothed
 from fitmat.uncertainty.posterior import GOOD_PARETO, Posterior
 from fitmat.uncertainty.scaled_weights import sampled, scaled_gaussian
 
@@ -84,8 +85,9 @@ def laplace_each(
 
     with ThreadPoolExecutor() as pool:
         pending = [pool.submit(one, name) for name in jobs]
-        # Slow to load, and this thread has nothing else to do.
-        importlib.import_module("arviz_stats.base.array" if corrected else "emcee")
+        if not corrected:
+            # Slow to load, and this thread has nothing else to do.
+            importlib.import_module("emcee")
         return [job.result() for job in pending]
 
 
@@ -180,22 +182,13 @@ def _reweighted(fit: Fit, rng: np.random.Generator) -> tuple[np.ndarray | None, 
     proposed, logs = proposed[alive], logs[alive]
     if len(logs) < FEWEST:
         return None, np.inf
-    weight, k = smoothed(logs)
+    weight, shape = smoothed(logs)
+    k = float(shape)
     if not (k <= GOOD_PARETO and 1.0 / np.sum(weight**2) >= FEWEST):
         return None, max(k, np.nextafter(GOOD_PARETO, 1.0))
     # Systematic resampling: one random offset, so that a draw of weight w is taken w·m times, up or down to an integer.
     places = np.searchsorted(np.cumsum(weight), (np.arange(LAPLACE_DRAWS) + rng.uniform()) / LAPLACE_DRAWS)
     return rng.permutation(proposed[np.minimum(places, len(weight) - 1)]), k
-
-
-def smoothed(logs: Float[np.ndarray, " m"]) -> tuple[Float[np.ndarray, " m"], float]:
-    """Weights that add to 1, their largest replaced by those of the Pareto tail that fits them, and its shape k̂."""
-    from arviz_stats.base.array import array_stats
-
-    # arviz_stats takes the negative: log-likelihoods of what is left out.
-    smooth, k = array_stats.psislw(-(logs - logs.max()))
-    weight = np.exp(smooth - smooth.max())
-    return weight / weight.sum(), float(k)
 
 
 def _discrepancy_sd(fit: Fit) -> float:

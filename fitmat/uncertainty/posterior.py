@@ -17,6 +17,7 @@ from fitmat.errors import OutputError
 from fitmat.extras import needed
 from fitmat.fitting.coordinates import channel_names
 from fitmat.fitting.result import Fit
+from fitmat.maths import normal
 from fitmat.models.parameters import Entry
 from fitmat.text import html_table, text_table, with_error
 
@@ -220,9 +221,35 @@ class Posterior:
 def split_rhat(chain: Float[np.ndarray, "steps walkers d"]) -> Float[np.ndarray, " d"]:
     """Rank-normalised split-R̂, of the bulk or of the tails, whichever is larger; walkers count as chains.
 
-    Vehtari, Gelman, Simpson, Carpenter & Bürkner 2021, Bayesian Analysis 16, eqs. 1–4 and 14, by ArviZ.
-    """
-    from arviz_stats.base.array import array_stats
+    Vehtari, Gelman, Simpson, Carpenter & Bürkner 2021, Bayesian Analysis 16, eqs. 1–4 and 14.
 
-    with np.errstate(invalid="ignore", divide="ignore"):  # NaN where no walker moved
-        return np.asarray(array_stats.rhat(chain, chain_axis=1, draw_axis=0), float)
+    Args:
+        chain: Draws; NaN comes of fewer than 4 steps or 2 walkers, of a NaN among them, and where no walker moved.
+    """
+    steps, walkers, d = chain.shape
+    if steps < 4 or walkers < 2:
+        return np.full(d, np.nan)
+    halves = np.concatenate([chain[: steps // 2], chain[-(steps // 2) :]], axis=1)
+    bulk = _rhat(_normal_scores(halves))
+    tails = _rhat(_normal_scores(np.abs(halves - np.median(halves, axis=(0, 1)))))
+    return np.where(np.isnan(chain).any(axis=(0, 1)), np.nan, np.fmax(bulk, tails))
+
+
+def _normal_scores(x: Float[np.ndarray, "steps chains d"]) -> Float[np.ndarray, "steps chains d"]:
+    """Each parameter's values replaced by normal quantiles of their ranks, Φ⁻¹((r − 3/8)/(S + 1/4)) (eq. 14).
+
+    Equal values share the mean of their ranks.
+    """
+    found, size = np.empty(x.shape), x.shape[0] * x.shape[1]
+    for k in range(x.shape[2]):
+        _, place, count = np.unique(x[..., k], return_inverse=True, return_counts=True)
+        rank = np.cumsum(count) - (count - 1) / 2
+        found[..., k] = normal.quantile((rank - 3 / 8) / (size + 1 / 4))[place.reshape(x.shape[:2])]
+    return found
+
+
+def _rhat(x: Float[np.ndarray, "steps chains d"]) -> Float[np.ndarray, " d"]:
+    """√((N − 1)/N + B/(N W)) with the variances between and within chains (eqs. 1–4)."""
+    between = np.var(x.mean(axis=0), axis=0, ddof=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.sqrt(between / np.var(x, axis=0, ddof=1).mean(axis=0) + 1.0 - 1.0 / len(x))

@@ -20,7 +20,6 @@ from fitmat.fitting.likelihood import (
     best_discrepancy,
     first_discrepancy,
     log_likelihood,
-    noise_scale,
     prepare,
     residuals,
 )
@@ -235,5 +234,5 @@ def test_scales_are_medians_over_valid_values(measured: fm.Measurements) -> None
     kappa = measured.wi[used, 2]
     x, noise = measured.value[used, 0] * kappa, measured.sigma[used, 0] * kappa
     assert first_discrepancy(data) == pytest.approx(0.1 * np.median(np.cbrt(x)))
-    assert noise_scale(data) == pytest.approx(np.median(noise / (3 * (x + noise) ** (2 / 3))))
-    assert NEGLIGIBLE * noise_scale(data) < 1e-5
+    assert data.typical == pytest.approx(np.median(noise / (3 * (x + noise) ** (2 / 3))))
+    assert NEGLIGIBLE * data.typical < 1e-5

@@ -125,8 +125,8 @@ def test_a_far_start_ends_in_the_same_place(scanned: Chunks, found: Fit, monkeyp
     climb, sums = streamed._climb, streamed._File.sums
 
     def elsewhere(file: Any, around: Any) -> Any:
-        far = with_vector(file.start.model, jnp.asarray([0.2, 0.1, 30.0]))
-        expected = np.asarray(information.expected_information(far, file.start.data, jnp.asarray(0.01)))
+        far = with_vector(file.start.model, np.array([0.2, 0.1, 30.0]))
+        expected = information.expected_information(far, file.start.data, 0.01)
         return climb(
             file, streamed._Range(dataclasses.replace(file.start, model=far, discrepancy=0.01, information=expected))
         )
@@ -229,7 +229,7 @@ def test_the_sums_are_derivatives_of_the_likelihood() -> None:
     """Against central differences."""
     m = measured(fm.model(MODEL, kd=0.3, ks=0.2, exponent=20.0), 1).rows(np.arange(0, 4000, 4))
     data, best, s = prepare(m, measured_noise(m)), fm.model(MODEL, kd=0.31, ks=0.18, exponent=22.0), 0.01
-    sums = block_sums(best, data, jnp.asarray(s))
+    sums = block_sums(best, data, s)
     every = coordinates(best)
     at = np.append(every.natural(np.asarray(vector(best))), s)
 

@@ -13,7 +13,7 @@ from fitmat.models.around.instrument import Seen
 from fitmat.models.around.noise import Noisy
 from fitmat.models.base import AbstractBRDF, evaluate
 from fitmat.models.parameters import vector, with_vector
-from fitmat.models.values import LARGE, SMALL, blocks, drawn, numbers, slices, surfaces, values, widths
+from fitmat.models.values import LARGE, SMALL, blocks, slices, surfaces, values, widths
 
 ROUNDING = 1e-12
 """Relative; two programs of one formula."""
@@ -29,7 +29,7 @@ SIZES = {
 
 def near(model: AbstractBRDF, count: int) -> np.ndarray:
     """So many vectors, each with other parameters."""
-    return numbers(model) * np.linspace(0.9, 1.0, count)[:, None]
+    return vector(model) * np.linspace(0.9, 1.0, count)[:, None]
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -97,7 +97,3 @@ def test_surfaces_leave_mount_instrument_and_noise_behind() -> None:
     np.testing.assert_array_equal(draws, near(base, 3))
 
 
-def test_numbers_and_draws_are_those_of_the_parameters() -> None:
-    model = fm.model("lambert+ggx", channels=2, kd=np.array([0.1, 0.2]))
-    np.testing.assert_array_equal(numbers(model), vector(model))
-    np.testing.assert_array_equal(numbers(drawn(model, 2.0 * numbers(model))), 2.0 * numbers(model))

@@ -15,7 +15,7 @@ from scipy import stats
 import fitmat as fm
 from fitmat.errors import FitmatError
 from fitmat.fitting.coordinates import coordinates
-from fitmat.fitting.likelihood import log_likelihood, noise_scale
+from fitmat.fitting.likelihood import log_likelihood
 from fitmat.fitting.result import Fit
 from fitmat.models.parameters import vector, with_vector
 from fitmat.uncertainty.chains import CHUNK
@@ -72,7 +72,7 @@ def test_the_moves_leave_the_target_as_it_is(fit: Fit, sampled: Posterior) -> No
     centre, shape = natural(fit, fit.values[None], np.zeros(1))[0, :4], fit.covariance / np.outer(scale, scale)
     wide, folded = rng.standard_t(5, (count, 4)), np.abs(rng.standard_cauchy(count))
     parameters = centre + wide @ np.linalg.cholesky(1.5 * shape).T
-    drawn = np.column_stack([parameters, 0.2 * float(noise_scale(fit.data)) * folded])
+    drawn = np.column_stack([parameters, 0.2 * float(fit.data.typical) * folded])
     logs = log_posterior(fit)(drawn) - stats.t.logpdf(wide, 5).sum(axis=1) - stats.cauchy.logpdf(folded)
     weight = np.exp(logs - logs.max())
     weight /= weight.sum()

@@ -166,7 +166,9 @@ def test_parts_count_only_in_their_order(fit: Fit, whole: Posterior, kept: Path)
 
 
 def test_checkpoints_of_another_run_are_refused(fit: Fit, kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    moved = dataclasses.replace(fit, data=dataclasses.replace(fit.data, x=fit.data.x.at[7].multiply(1 + 1e-12)))
+    x = fit.data.x.copy()
+    x[7] *= 1 + 1e-12
+    moved = dataclasses.replace(fit, data=dataclasses.replace(fit.data, x=x))
     prior = prepare_prior(fit.model, fit.measurements.instrument, {"kd": (0.3, 0.2)})
     informed = dataclasses.replace(fit, data=dataclasses.replace(fit.data, prior=prior))
     refused = r"kept holds checkpoints of another run: other data, model, priors, .*; remove that folder, or name"

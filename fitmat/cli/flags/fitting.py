@@ -78,3 +78,11 @@ IorFlag = Annotated[
 TiltFlag = Annotated[
     bool, typer.Option("--tilt", help="Fit how far the sample's normal leans in its mount, with every model.")
 ]
+FullFlag = Annotated[
+    bool,
+    typer.Option(
+        "--full",
+        help="Ask and draw everything: residuals, corner plots and lit spheres as pictures, the parameters with which "
+        "one model best imitates the other, and what each predicts of single values left out.",
+    ),
+]

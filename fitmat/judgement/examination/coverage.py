@@ -7,7 +7,6 @@ import dataclasses
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.spatial import KDTree
 
 from fitmat.maths.directions import zenith
 from fitmat.measurements.samples import IN_PLANE, Measurements
@@ -211,5 +210,7 @@ def covered(local: Float[np.ndarray, "k 3"]) -> float:
     across = np.sqrt(1 - z**2)
     asked = np.stack([across * np.cos(azimuth), np.abs(across * np.sin(azimuth)), z], axis=1)
     folded = local * np.where(local[:, 1:2] < 0, [1.0, -1.0, 1.0], 1.0)
+    from scipy.spatial import KDTree
+
     distance = KDTree(folded).query(asked)[0]
     return float(np.mean(distance <= 2.0 * np.sin(NEAR / 2.0)))

@@ -9,7 +9,6 @@ import dataclasses
 
 import numpy as np
 from jaxtyping import Float
-from scipy.interpolate import PchipInterpolator
 
 from fitmat.fitting.priors import natural_sd
 from fitmat.fitting.result import Fit
@@ -59,6 +58,8 @@ class Ridge:
 
     def draws(self, count: int, seed: int) -> Float[np.ndarray, "m p"]:
         """Physical parameter vectors along the bent ridge, kept within the bounds, fixed ones included."""
+        from scipy.interpolate import PchipInterpolator
+
         rng, moved = np.random.default_rng(seed), self.fit.coordinates
         which = rng.choice(len(self.weight), count, p=self.weight)
         at = self.centre[:, self.place]

@@ -1,15 +1,16 @@
 """Spectra: what colour the channels of a file have to an eye, and how different two colours look.
 
-It knows no material and no light but daylight D65; the only importer of colour-science.
+It knows no material and no light but daylight D65; the spaces in which colours are compared are those of `differences`.
 """
 
 import dataclasses
 import functools
-import warnings
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
+
+from fitmat.match.appearance import differences
 
 COVERED = 0.95
 """Share of each colour-matching function that must lie between the first and the last wavelength."""
@@ -20,10 +21,11 @@ LARGEST_GAP = 50.0
 WHITE_LUMINANCE = 203.0
 """Luminance of white in cd/m² where ΔE_ITP needs one: the reference white of ITU-R BT.2408-7, sec. 2.1."""
 
-HIGHEST_LUMINANCE = 10_000.0
-"""What the perceptual quantiser of SMPTE ST 2084 can say at most, in cd/m²."""
+FROM_SRGB = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+"""Linear sRGB to XYZ, to the four digits of IEC 61966-2-1."""
 
-OBSERVER, ILLUMINANT = "CIE 1931 2 Degree Standard Observer", "D65"
+FILE = Path(__file__).with_name("observer.npz")
+"""Wavelengths in nm, and the CIE 1931 2° observer times D65 there; `benchmarks/observer.py`."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -54,7 +56,7 @@ def colouring(channels: tuple[str, ...]) -> Colouring:
     if len(names) == 1:
         return _grey(1, "one channel, drawn grey")
     if set(names) == set("rgb") and len(names) == 3:
-        return Colouring(_from_srgb().T[["rgb".index(name) for name in names]], "r, g and b as linear sRGB")
+        return Colouring(FROM_SRGB.T[["rgb".index(name) for name in names]], "r, g and b as linear sRGB")
     if set(names) == set("xyz") and len(names) == 3:
         return Colouring(np.eye(3)[["xyz".index(name) for name in names]], "x, y and z as tristimulus values under D65")
     wavelengths = _numbers(names)
@@ -64,45 +66,43 @@ def colouring(channels: tuple[str, ...]) -> Colouring:
 
 
 def delta_e_2000(one: Float[np.ndarray, "... 3"], other: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "..."]:
-    """CIEDE2000 colour difference (Sharma, Wu & Dalal 2005, eqs. 2–22), k_L = k_C = k_H = 1.
+    """CIEDE2000 colour difference, `differences.ciede2000`.
 
     Args:
         one: CIE XYZ, white D65 at Y = 1.
         other: The same of the other colours.
     """
-    colour = _colour()
-    labs = (colour.XYZ_to_Lab(xyz, colour.CCS_ILLUMINANTS[OBSERVER][ILLUMINANT]) for xyz in (one, other))
-    return np.asarray(colour.delta_E(*labs, method="CIE 2000"))
+    return differences.ciede2000(differences.to_lab(one), differences.to_lab(other))
 
 
 def delta_e_itp(one: Float[np.ndarray, "... 3"], other: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "..."]:
-    """ΔE_ITP of ITU-R BT.2124-0, annex 1: 720 √(ΔI² + ΔT² + ΔP²), with T = C_T/2 and P = C_P of BT.2100.
+    """ΔE_ITP, `differences.itp`.
 
     Args:
-        one: CIE XYZ, white D65 at Y = 1, which has `WHITE_LUMINANCE`; clipped to `HIGHEST_LUMINANCE`.
+        one: CIE XYZ, white D65 at Y = 1, which has `WHITE_LUMINANCE`; clipped to what ITU-R BT.2100 can say.
         other: The same of the other colours.
     """
-    colour = _colour()
-    pairs = (np.clip(WHITE_LUMINANCE * xyz, 0.0, HIGHEST_LUMINANCE) for xyz in (one, other))
-    return np.asarray(colour.delta_E(*(colour.XYZ_to_ICtCp(xyz) for xyz in pairs), method="ITP"))
+    pairs = (np.clip(WHITE_LUMINANCE * xyz, 0.0, differences.HIGHEST_LUMINANCE) for xyz in (one, other))
+    return differences.itp(*(differences.to_ictcp(xyz) for xyz in pairs))
 
 
 def shown(xyz: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3"]:
     """XYZ as an sRGB display shows it: red, green and blue of at least 0 and at most those of white (Y = 1)."""
-    return _linear(xyz) @ _from_srgb().T
+    return _linear(xyz) @ FROM_SRGB.T
 
 
 def to_srgb(xyz: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3"]:
     """XYZ (white Y = 1) as sRGB values from 0 to 1, encoded as in IEC 61966-2-1."""
-    return np.asarray(_colour().cctf_encoding(_linear(xyz), function="sRGB"))
+    linear = _linear(xyz)
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
 def _linear(xyz: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3"]:
-    return np.clip(xyz @ np.linalg.inv(_from_srgb()).T, 0.0, 1.0)
+    return np.clip(xyz @ np.linalg.inv(FROM_SRGB).T, 0.0, 1.0)
 
 
 def _grey(count: int, words: str) -> Colouring:
-    return Colouring(np.tile(_from_srgb().sum(axis=1) / count, (count, 1)), words)
+    return Colouring(np.tile(FROM_SRGB.sum(axis=1) / count, (count, 1)), words)
 
 
 def _numbers(names: tuple[str, ...]) -> Float[np.ndarray, " c"] | None:
@@ -136,22 +136,5 @@ def _listed(names: tuple[str, ...]) -> str:
 @functools.cache
 def _seen() -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
     """Wavelengths of 1 nm and colour-matching functions times D65, which CIE interpolates linearly (CIE 15:2018)."""
-    colour = _colour()
-    matching, light = colour.MSDS_CMFS[OBSERVER], colour.SDS_ILLUMINANTS[ILLUMINANT]
-    power = np.interp(matching.wavelengths, light.wavelengths, light.values, right=0.0)
-    return matching.wavelengths, matching.values * power[:, None]
-
-
-@functools.cache
-def _from_srgb() -> Float[np.ndarray, "3 3"]:
-    """Linear sRGB to XYZ, to the four digits of IEC 61966-2-1."""
-    return np.asarray(_colour().RGB_COLOURSPACES["sRGB"].matrix_RGB_to_XYZ)
-
-
-@functools.cache
-def _colour() -> Any:
-    """colour-science, imported at first use; it would set filters for the warnings of the whole process."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        import colour
-    return colour
+    with np.load(FILE) as arrays:
+        return arrays["wavelength"], arrays["seen"]

@@ -11,7 +11,6 @@ import dataclasses
 
 import numpy as np
 from jaxtyping import Float
-from scipy.ndimage import map_coordinates
 
 from fitmat.match.appearance import scene
 from fitmat.match.appearance.colour import colouring, delta_e_2000, delta_e_itp, shown, to_srgb
@@ -22,7 +21,7 @@ from fitmat.models.base import AbstractBRDF
 from fitmat.models.values import Draws, blocks, surfaces, values, widths
 from fitmat.uncertainty.estimate import Estimate, estimate
 
-SPHERE_DRAWS = 40
+SPHERE_DRAWS = 20
 """Pairs of posterior draws behind every interval."""
 
 MIDDLE_GREY = 0.18
@@ -64,15 +63,26 @@ class Lighting:
         exposure: Factor from radiance (irradiance 1 on a surface that faces the light; sky zenith 1) to display.
         delta_e_2000: CIEDE2000 of what an sRGB display shows, which clips what is brighter than white.
         delta_e_itp: ΔE_ITP with white at `colour.WHITE_LUMINANCE`, highlights up to 10,000 cd/m².
-        empirical: Picture of the best fit in sRGB from 0 to 1, (h, w, 3), rows from the top; NaN beside the sphere.
-        microfacet: The same of the microfacet model.
-        difference: ΔE2000 of the pictures, (h, w); NaN beside the sphere.
+        pictures: Of the best fits; None where they were not asked for.
     """
 
     name: str
     exposure: float
     delta_e_2000: Spread
     delta_e_itp: Spread
+    pictures: "Pictures | None"
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Pictures:
+    """Both spheres as pictures, rows from the top; NaN beside the sphere.
+
+    Attributes:
+        empirical: In sRGB from 0 to 1, (h, w, 3).
+        microfacet: The same of the microfacet model.
+        difference: ΔE2000 of the two, (h, w).
+    """
+
     empirical: Float[np.ndarray, "h w 3"]
     microfacet: Float[np.ndarray, "h w 3"]
     difference: Float[np.ndarray, "h w"]
@@ -115,7 +125,12 @@ class Perceived:
 
 
 def perceived(
-    empirical: AbstractBRDF, microfacet: AbstractBRDF, draws: PairedDraws, channels: tuple[str, ...]
+    empirical: AbstractBRDF,
+    microfacet: AbstractBRDF,
+    draws: PairedDraws,
+    channels: tuple[str, ...],
+    *,
+    pictures: bool = True,
 ) -> Perceived:
     """Both models' spheres in every light, and what an eye sees of their difference.
 
@@ -129,12 +144,13 @@ def perceived(
         draws: Parameter vectors of both, paired, rows: the best fits, then posterior draws, (d, p) and (d, q); at
             most `SPHERE_DRAWS` of these are used, evenly spread.
         channels: Names of the channels.
+        pictures: Whether to make pictures as well.
 
     Example:
         >>> import fitmat as fm
-        >>> from fitmat.models.values import numbers
+        >>> from fitmat.models.parameters import vector
         >>> one, other = fm.model("lambert+phong", kd=0.3), fm.model("lambert+ggx", kd=0.3)
-        >>> found = perceived(one, other, (numbers(one)[None], numbers(other)[None]), ("value",))
+        >>> found = perceived(one, other, (vector(one)[None], vector(other)[None]), ("value",))
         >>> found.colours
         'one channel, drawn grey'
     """
@@ -143,7 +159,8 @@ def perceived(
     pair = surfaces(empirical, draws[0][used]), surfaces(microfacet, draws[1][used])
     screens, computed = _rendered(pair, colours.weights)
     names = [*scene.LIGHTS, scene.ENVIRONMENT]
-    found = [_lighting(name, screen, xyz) for name, screen, xyz in zip(names, screens, computed, strict=True)]
+    each = zip(names, screens, computed, strict=True)
+    found = [_lighting(name, screen, xyz, pictures) for name, screen, xyz in each]
     every = [np.concatenate([deltas[k] for _, deltas, _ in found], axis=1) for k in range(2)]
     shares = np.concatenate([share for _, _, share in found])
     return Perceived(
@@ -187,24 +204,27 @@ def _coloured(f: Float[np.ndarray, "d m c"], weights: Float[np.ndarray, "c 3"]) 
 
 
 def _lighting(
-    name: str, screen: Screen, xyz: Float[np.ndarray, "d 2 m 3"]
+    name: str, screen: Screen, xyz: Float[np.ndarray, "d 2 m 3"], pictures: bool
 ) -> tuple[Lighting, list[np.ndarray], np.ndarray]:
     """The lighting; ΔE2000 and ΔE_ITP of all draws, (d, m) each; each pixel's share of the lit area, (m,)."""
     share = np.asarray(screen.area / screen.area.sum()).ravel()
     exposure = float(MIDDLE_GREY / max(share @ xyz[0, 1, :, 1], 1e-300))
     one, other = np.moveaxis(exposure * xyz, 1, 0)
     deltas = [delta_e_2000(shown(one), shown(other)), delta_e_itp(one, other)]
-    drawn = _pictures(screen, np.concatenate([one[0], other[0]], axis=1))
     lighting = Lighting(
         name=name,
         exposure=exposure,
         delta_e_2000=_spread(deltas[0], share),
         delta_e_itp=_spread(deltas[1], share),
-        empirical=to_srgb(drawn[..., :3]),
-        microfacet=to_srgb(drawn[..., 3:]),
-        difference=delta_e_2000(shown(drawn[..., :3]), shown(drawn[..., 3:])),
+        pictures=_both(screen, one[0], other[0]) if pictures else None,
     )
     return lighting, deltas, share
+
+
+def _both(screen: Screen, one: Float[np.ndarray, "m 3"], other: Float[np.ndarray, "m 3"]) -> Pictures:
+    drawn = _pictures(screen, np.concatenate([one, other], axis=1))
+    one, other = drawn[..., :3], drawn[..., 3:]
+    return Pictures(to_srgb(one), to_srgb(other), delta_e_2000(shown(one), shown(other)))
 
 
 def _spread(delta: Float[np.ndarray, "d m"], share: Float[np.ndarray, " m"]) -> Spread:
@@ -220,6 +240,8 @@ def _spread(delta: Float[np.ndarray, "d m"], share: Float[np.ndarray, " m"]) -> 
 
 def _pictures(screen: Screen, values: Float[np.ndarray, "m k"]) -> Float[np.ndarray, "h w k"]:
     """Values between the pixels by linear interpolation, averaged over the points of each pixel of the picture."""
+    from scipy.ndimage import map_coordinates
+
     count = SIZE * SUBPIXELS
     middle = (np.arange(count) + 0.5) * 2.0 / count - 1.0
     x, y = np.meshgrid(middle, -middle)

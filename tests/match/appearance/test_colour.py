@@ -1,12 +1,15 @@
-"""Colours and their differences against published numbers and the formulas of the standards."""
+"""Colours and their differences against published numbers, the formulas of the standards, and colour-science."""
 
+import importlib
 import subprocess
 import sys
+import warnings
+from types import ModuleType
 
 import numpy as np
 import pytest
 
-from fitmat.match.appearance import colour
+from fitmat.match.appearance import colour, differences
 from fitmat.match.appearance.colour import colouring, delta_e_2000, delta_e_itp
 
 PRINTED = 5e-5
@@ -14,6 +17,11 @@ PRINTED = 5e-5
 
 ROUNDED = 2e-4
 """XYZ and chromaticities; sRGB's matrix has four digits, CIE's white point five."""
+
+ROUNDING = 1e-9
+"""Differences, absolute: the power of 78.8 in the perceptual quantiser takes five digits."""
+
+OBSERVER, ILLUMINANT = "CIE 1931 2 Degree Standard Observer", "D65"
 
 STANDARD = 1e-3
 """ΔE_ITP, relative; the matrix of BT.2020 from its chromaticities here, rounded to four digits by some."""
@@ -45,6 +53,17 @@ SHARMA = np.array(
 Left out are pairs 10 and 14: opposite hues to the last digit, where the formula jumps and rounding decides.
 """
 
+JUMPS = np.array([[50, 2.49, -0.001, 50, -2.49, 0.001, 7.1792], [50, -0.001, 2.49, 50, 0.001, -2.49, 4.8045]])
+"""Pairs 10 and 14, which only L*a*b* itself holds to the last digit."""
+
+
+@pytest.fixture(scope="module")
+def science() -> ModuleType:
+    """colour-science, which sets filters for warnings."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return importlib.import_module("colour")
+
 
 def to_xyz(lab: np.ndarray) -> np.ndarray:
     """CIE 15:2018, the inverse of eqs. 8.3–8.8, white at Y = 1."""
@@ -54,6 +73,8 @@ def to_xyz(lab: np.ndarray) -> np.ndarray:
 
 def test_colour_differences_are_those_that_sharma_printed() -> None:
     assert len(SHARMA) == 32
+    pairs = np.concatenate([SHARMA, JUMPS])
+    np.testing.assert_allclose(differences.ciede2000(pairs[:, :3], pairs[:, 3:6]), pairs[:, 6], atol=PRINTED)
     found = delta_e_2000(to_xyz(SHARMA[:, :3]), to_xyz(SHARMA[:, 3:6]))
     np.testing.assert_allclose(found, SHARMA[:, 6], atol=PRINTED)
 
@@ -126,14 +147,66 @@ def test_tristimulus_values_are_taken_as_they_are() -> None:
     np.testing.assert_array_equal(colouring(("y", "x", "z")).weights, np.eye(3)[[1, 0, 2]])
 
 
-def test_the_colour_library_is_loaded_late_and_leaves_warnings_alone() -> None:
+def light(seed: int, top: float) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of colours within BT.2020, XYZ: any, some alike, black and greys."""
+    rng = np.random.default_rng(seed)
+    rgb = rng.uniform(0.0, top, (2, 2000, 3))
+    rgb[1, :1000] = rgb[0, :1000] * (1.0 + 0.02 * rng.normal(size=(1000, 3)))
+    rgb[0, -3:] = [[0.0, 0.0, 0.0], [top, top, top], [0.0, 0.0, 0.0]]
+    rgb[1, -2:] = [[top / 2, top / 2, top / 2], [0.0, 0.0, 0.0]]
+    one, other = rgb @ differences._from_bt2020().T
+    return one, other
+
+
+@pytest.mark.parametrize("top", [0.01, 1.0, 40.0])
+def test_differences_are_those_of_colour_science(science: ModuleType, top: float) -> None:
+    one, other = light(2, top)
+    labs = [science.XYZ_to_Lab(xyz, science.CCS_ILLUMINANTS[OBSERVER][ILLUMINANT]) for xyz in (one, other)]
+    np.testing.assert_allclose(differences.to_lab(one), labs[0], rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(delta_e_2000(one, other), science.delta_E(*labs, method="CIE 2000"), atol=ROUNDING)
+    # Where one XYZ is clipped at the top the other two are not: what is left may be no light at all.
+    dim = np.maximum(one, other).max(axis=1) < 10_000.0 / 203.0
+    assert dim.mean() > 0.5
+    pairs = [science.XYZ_to_ICtCp(203.0 * xyz[dim]) for xyz in (one, other)]
+    np.testing.assert_allclose(delta_e_itp(one, other)[dim], science.delta_E(*pairs, method="ITP"), atol=ROUNDING)
+
+
+def test_what_no_light_can_be_has_a_finite_difference() -> None:
+    """X or Z alone, to which some cones would respond less than not at all; I, T and P end at 1, 1.7 and 4.4."""
+    imaginary = np.eye(3)[[0, 2]]
+    lms = imaginary @ np.linalg.inv(differences._from_bt2020()).T @ differences.RGB_TO_LMS.T
+    assert (lms.min(axis=1) < 0.0).all()
+    found = delta_e_itp(imaginary, np.tile(WHITE, (2, 1)))
+    assert np.all((found > 1.0) & (found < 720.0 * np.sqrt(1.0 + 1.7**2 + 4.4**2)))
+
+
+def test_displays_are_those_of_colour_science(science: ModuleType) -> None:
+    xyz = light(3, 1.2)[0]
+    matrix = science.RGB_COLOURSPACES["sRGB"].matrix_RGB_to_XYZ
+    np.testing.assert_array_equal(colour.FROM_SRGB, matrix)
+    linear = np.clip(xyz @ np.linalg.inv(matrix).T, 0.0, 1.0)
+    assert (linear < 0.0031308).any()
+    np.testing.assert_allclose(colour.to_srgb(xyz), science.cctf_encoding(linear, function="sRGB"), atol=1e-12)
+
+
+def test_the_observer_and_daylight_are_those_of_colour_science(science: ModuleType) -> None:
+    """Multiplied at 1 nm, D65 interpolated between its nodes of CIE 15:2018."""
+    wavelength, seen = colour._seen()
+    matching, daylight = science.MSDS_CMFS[OBSERVER], science.SDS_ILLUMINANTS[ILLUMINANT]
+    power = np.interp(wavelength, daylight.wavelengths, daylight.values, right=0.0)
+    np.testing.assert_array_equal(wavelength, matching.wavelengths)
+    np.testing.assert_allclose(seen, matching.values * power[:, None], rtol=1e-14)
+
+
+def test_no_colour_library_is_loaded() -> None:
     code = """
-import sys, warnings
+import sys
+import numpy as np
 from fitmat.match.appearance import colour
-assert "colour" not in sys.modules
-before = list(warnings.filters)
-colour.colouring(("r", "g", "b"))
-assert "colour" in sys.modules and warnings.filters == before
+spectrum = colour.colouring(tuple(map(str, range(380, 781, 10)))).weights
+colour.delta_e_2000(spectrum, spectrum[::-1]), colour.delta_e_itp(spectrum, spectrum[::-1])
+colour.shown(spectrum), colour.to_srgb(colour.colouring(("r", "g", "b")).weights)
+assert not {"colour", "scipy"} & set(sys.modules)
 """
     done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

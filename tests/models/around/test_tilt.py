@@ -93,7 +93,7 @@ def test_the_peak_moves_two_degrees_per_degree() -> None:
     wi, theta = jnp.array(from_angles(np.deg2rad(30.0), np.array(np.pi))), jnp.array(_peak(1.0, 30.0))
 
     def log_value(tilt: jax.Array, theta_o: jax.Array) -> jax.Array:
-        angle, model = jnp.deg2rad(theta_o), with_vector(template, vector(template).at[place].set(tilt))
+        angle, model = jnp.deg2rad(theta_o), with_vector(template, jnp.asarray(vector(template)).at[place].set(tilt))
         return jnp.log(model(wi, jnp.stack([jnp.sin(angle), 0.0 * angle, jnp.cos(angle)])))
 
     both = jax.jit(jax.jacfwd(jax.grad(log_value, argnums=1), argnums=(0, 1)))(jnp.array(1.0), theta)
@@ -169,7 +169,7 @@ def test_gradients_are_finite_differences(hemisphere: Hemisphere, singular: Pair
     bounds = coordinates(model)
     for point in (bounds.lower, bounds.upper, np.asarray(vector(model))):
         assert np.isfinite(slopes(jnp.array(point), special_i, special_o)).all()
-    point = vector(model).at[names["tilt_x"]].set(2.0).at[names["tilt_y"]].set(-3.0)
+    point = jnp.asarray(vector(model)).at[names["tilt_x"]].set(2.0).at[names["tilt_y"]].set(-3.0)
     lit = np.asarray(values(point, wi, wo)) > 0
     for name in ("tilt_x", "tilt_y"):
         at = [np.asarray(values(point.at[names[name]].add(j * 1e-3), wi, wo)) for j in (-2, -1, 1, 2)]
