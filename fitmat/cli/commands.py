@@ -8,6 +8,7 @@ from typing import Any
 import typer
 
 from fitmat.cli import process
+from fitmat.cli.flags.cache import ClearFlag
 from fitmat.cli.flags.design import CountFlag, ForFlag, KindFlag
 from fitmat.cli.flags.files import (
     ConvertedFlag,
@@ -103,21 +104,27 @@ def fit(
     full: FullFlag = False,
 ) -> None:
     """Fit models to a file of measurements and write a report with the Phong–microfacet match."""
-    process.set_up()
-    from fitmat import files
     from fitmat.cli import session
-    from fitmat.fitting import priors
-    from fitmat.models.parameters import assignments
-    from fitmat.reports import page, terminal
-    from fitmat.studies.study import study
 
-    fixed, believed = assignments(fix or [], "--fix"), priors.assignments(prior or [])
-    told = {"loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
-    target = out or files.default(file)
-    with files.new(target, force=force, stale=page.POSTERIOR.format("*")) as draft:
-        process.leave_on_interrupt(draft)
-        with session.watch() as watch:
+    with session.watch() as watch:
+        process.set_up()
+        from fitmat import files
+        from fitmat.fitting import priors
+        from fitmat.maths import programs
+        from fitmat.models.parameters import assignments
+        from fitmat.reports import page, terminal
+        from fitmat.studies.study import study
+
+        fixed, believed = assignments(fix or [], "--fix"), priors.assignments(prior or [])
+        told = {"loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
+        target = out or files.default(file)
+        with (
+            files.new(target, force=force, stale=page.POSTERIOR.format("*")) as draft,
+            programs.announced(watch.compiling),
+        ):
+            process.leave_on_interrupt(draft)
             measurements = session.source(file, reading | {"instrument": instrument}, watch)
+            process.load_beside("fitmat.reports.plot")
             found = study(
                 measurements,
                 models,
@@ -130,13 +137,16 @@ def fit(
                 progress=watch,
                 **told,
             )
-        page.write(draft, found)
+            watch("writing the report", 0, 0)
+            page.write(draft, found)
     if not no_mcmc:
         files.discard(files.resumed(target))
     if json_:
         sys.stdout.write((target / "fit.json").read_text(encoding="utf-8"))
     else:
         terminal.show(found, target)
+    if programs.folder() is None and (why := programs.kept()).why:
+        typer.echo(why.words, err=True)
     if any(p.fit.result != "converged" or p.interrupted for p in found.posteriors):
         raise typer.Exit(NOT_CONVERGED)
 
@@ -267,18 +277,23 @@ def design(
     fix: FixFlag = None,
 ) -> None:
     """Say which angles to measure next, and by how much they would narrow what is not yet known."""
-    process.set_up()
-    from fitmat.cli import design, session
-    from fitmat.measurements.reader import read
-    from fitmat.models.parameters import assignments
-    from fitmat.studies.plan import plan
-    from fitmat.studies.study import fit_each
+    from fitmat.cli import session
 
-    measurements = read(file, **reading, instrument=instrument)
-    jobs = plan(models, measurements, fixed=assignments(fix or [], "--fix"))
     with session.watch() as watch:
-        posteriors = fit_each(measurements, jobs, seed=seed, progress=watch)
-    found = design.propose(posteriors, for_, kind=kind, count=count, picture=plot, force=force)
+        process.set_up()
+        from fitmat.cli import design
+        from fitmat.maths import programs
+        from fitmat.measurements.reader import read
+        from fitmat.models.parameters import assignments
+        from fitmat.studies.plan import plan
+        from fitmat.studies.study import fit_each
+
+        measurements = read(file, **reading, instrument=instrument)
+        jobs = plan(models, measurements, fixed=assignments(fix or [], "--fix"))
+        with programs.announced(watch.compiling):
+            posteriors = fit_each(measurements, jobs, seed=seed, progress=watch)
+            watch("looking for the next angles", 0, 0)
+            found = design.propose(posteriors, for_, kind=kind, count=count, picture=plot, force=force)
     typer.echo(design.as_json(found) if json_ else design.as_text(found))
 
 
@@ -288,3 +303,13 @@ def losses() -> None:
     from fitmat.cli import manual
 
     manual.list_losses()
+
+
+@app.command()
+def cache(
+    clear: ClearFlag = False,
+) -> None:
+    """Say where compiled programs are kept and how many there are; they spare each run the compiling of the first."""
+    from fitmat.maths import programs
+
+    typer.echo(programs.remove().words if clear else programs.kept().words)

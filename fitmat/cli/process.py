@@ -3,12 +3,14 @@
 It knows no command.
 """
 
+import importlib
 import io
 import logging
 import os
 import shutil
 import signal
 import sys
+import threading
 import warnings
 from pathlib import Path
 from types import FrameType
@@ -44,14 +46,15 @@ def leave_on_interrupt(draft: Path | None = None) -> None:
 
 
 def set_up() -> None:
-    """Turn on 64-bit floats and keep compiled programs between runs."""
+    """Turn on 64-bit floats."""
     import jax
-    import platformdirs
 
     jax.config.update("jax_enable_x64", True)
-    cache = platformdirs.user_cache_path("fitmat") / "compiled"
-    jax.config.update("jax_compilation_cache_dir", str(cache))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+
+
+def load_beside(module: str) -> None:
+    """Load a module in a thread, while this one has other things to do."""
+    threading.Thread(target=importlib.import_module, args=(module,), daemon=True).start()
 
 
 def end(message: str) -> None:

@@ -5,81 +5,122 @@ Nothing is computed here, and no result is shown.
 
 import contextlib
 import signal
+import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from fitmat.measurements.large import chunks
-from fitmat.measurements.large.stream import Stream
-from fitmat.measurements.reader import read
-from fitmat.measurements.samples import Measurements
-from fitmat.studies.study import SAMPLING
+if TYPE_CHECKING:
+    from fitmat.measurements.large.stream import Stream
+    from fitmat.measurements.samples import Measurements
+
+SAMPLING = "sampling"
+"""How the stages begin in which an interrupt keeps what was done."""
 
 
 class Watch:
-    """What a run tells of its progress, as a bar on stderr; while it samples, Ctrl-C asks it to stop.
+    """What a run tells of its progress on stderr; while it samples, Ctrl-C asks it to stop.
 
-    The first Ctrl-C during sampling is raised as KeyboardInterrupt at the next step, so that
-    what was done is kept; a second one, and any other, is as before.
+    At a terminal it is one line with a bar, elsewhere a line for each stage. The first Ctrl-C during sampling is raised
+    as KeyboardInterrupt at the next step, so that what was done is kept; a second one, and any other, is as before.
     """
 
-    def __init__(self, bar: Progress) -> None:
-        self._bar, self._task, self._stage = bar, TaskID(0), ""
+    def __init__(self, screen: Console) -> None:
+        self._screen, self._stage, self._told = screen, "", set()
+        self._bar: Progress | None = None
+        self._task = TaskID(0)
         self._before: Any = None
         self._asked = False
+
+    def open(self, what: str) -> None:
+        """Show that something is going on, at a terminal only, before there is a stage."""
+        if self._screen.is_terminal and not self._screen.is_dumb_terminal:
+            parts = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(20), TimeElapsedColumn())
+            self._bar = Progress(*parts, TimeRemainingColumn(), console=self._screen, transient=True)
+            self._bar.start()
+            self._task = self._bar.add_task(what, total=None)
 
     def __call__(self, what: str, done: int, total: int) -> None:
         """Show the stage; stop where that was asked for."""
         sampling = what.startswith(SAMPLING)
         if what != self._stage:
             self._begin(what, sampling)
-        self._bar.update(self._task, completed=done, total=total or None)
+        if self._bar is not None:
+            self._bar.update(self._task, completed=done, total=total or None)
         if sampling and self._asked:
             raise KeyboardInterrupt
 
+    def compiling(self, what: str) -> None:
+        """Say that a program is compiled, which happens once."""
+        words = f"compiling {what}, once for this machine"
+        if self._bar is not None:
+            self._bar.update(self._task, description=f"{self._stage}: {words}" if self._stage else words)
+        elif words not in self._told:
+            self._told.add(words)
+            self._say(words)
+
     def _begin(self, what: str, sampling: bool) -> None:
-        self._stage, self._task = what, self._bar.add_task(what, total=None)
-        if "resumed" in what:
-            self._bar.console.print(f"{what[0].upper()}{what[1:]}.", highlight=False)
+        self._stage = what
+        if self._bar is not None:
+            self._bar.remove_task(self._task)
+            self._task = self._bar.add_task(what, total=None)
+        if self._bar is None or "resumed" in what:
+            self._say(f"{what[0].upper()}{what[1:]}.")
         if sampling and self._before is None:
             self._before = signal.signal(signal.SIGINT, self._note)
         elif not sampling:
-            self.close()
+            self._give_back()
+
+    def _say(self, words: str) -> None:
+        self._screen.print(words, highlight=False, markup=False, soft_wrap=True)
 
     def _note(self, number: int, frame: FrameType | None) -> None:
         self._asked = True
-        self.close()
+        self._give_back()
 
-    def close(self) -> None:
+    def _give_back(self) -> None:
         """Give Ctrl-C back to whom it belonged."""
         if self._before is not None:
             signal.signal(signal.SIGINT, self._before)
             self._before = None
 
+    def close(self) -> None:
+        """Take the line away, and give Ctrl-C back."""
+        self._give_back()
+        if self._bar is not None:
+            self._bar.stop()
+            self._bar = None
+
 
 @contextlib.contextmanager
-def watch() -> Iterator[Watch]:
-    """A progress bar on stderr, where that is a terminal, for as long as the block runs."""
-    screen = Console(stderr=True)
-    parts = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*parts, console=screen, transient=True, disable=not screen.is_terminal) as bar:
-        told = Watch(bar)
-        try:
-            yield told
-        finally:
-            told.close()
+def watch(what: str = "loading") -> Iterator[Watch]:
+    """A `Watch` for as long as the block runs.
+
+    Args:
+        what: What is done before the first stage.
+    """
+    told = Watch(Console(stderr=True))
+    told.open(what)
+    try:
+        yield told
+    finally:
+        told.close()
+        sys.stderr.flush()
 
 
-def source(file: Path, reading: Mapping[str, Any], told: Watch) -> Measurements | Stream:
+def source(file: Path, reading: Mapping[str, Any], told: Watch) -> "Measurements | Stream":
     """The measurements of a file: in memory, or to be passed over where it is large.
 
     Raises:
         ReadError: as `fitmat.read`.
     """
+    from fitmat.measurements.large import chunks
+    from fitmat.measurements.reader import read
+
     if not chunks.is_large(file):
         return read(file, **reading)
 

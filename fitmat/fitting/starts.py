@@ -103,7 +103,7 @@ def nonnegative(gram: Float[np.ndarray, "... k k"], moment: Float[np.ndarray, ".
         moment: m = Aᵀb, (…, k).
     """
     diagonal = np.diagonal(gram, axis1=-2, axis2=-1)
-    used = diagonal > 0
+    used = np.asarray(diagonal > 0)
     safe, w = np.where(used, diagonal, 1.0), np.zeros_like(moment)
     for _ in range(SWEEPS):
         before = w.copy()

@@ -114,6 +114,7 @@ class Program:
         name = f"{self._name}-{hashlib.sha256(words.encode()).hexdigest()[:24]}"
         exported = _read(name)
         if exported is None:
+            _tell(given)
             flat.__name__ = name
             exported = _exported(flat, arrays)
             if exported is None:
@@ -128,6 +129,25 @@ class Program:
 
 
 _EVERY: list[Program] = []
+
+_TOLD: list[Callable[[str], None]] = []
+
+
+@contextlib.contextmanager
+def announced(told: Callable[[str], None]) -> Iterator[None]:
+    """Call `told` with the name of the model, or "", before a program is compiled, for as long as the block runs."""
+    _TOLD.append(told)
+    try:
+        yield
+    finally:
+        _TOLD.remove(told)
+
+
+def _tell(given: tuple[tuple, dict]) -> None:
+    name = next((part.name for part in given[0] if isinstance(getattr(part, "name", None), str)), "")
+    for told in _TOLD:
+        told(name)
+
 
 _ARRAYS = (jax.Array, np.ndarray, np.generic)
 
@@ -210,29 +230,33 @@ def machine() -> str:
         return f"{platform.machine()} {platform.processor()}"
 
 
-@functools.cache
 def folder() -> Path | None:
     """Where programs are kept, made for this user alone; None where there is no such place."""
-    chosen = os.environ.get(FOLDER)
+    return _opened(os.environ.get(FOLDER))[0]
+
+
+@functools.cache
+def _opened(chosen: str | None) -> tuple[Path | None, str]:
+    """The folder, or why there is none; "" where none is wanted."""
     if chosen == "":
-        return None
+        return None, ""
     place = Path(chosen) if chosen else platformdirs.user_cache_path("fitmat") / "programs"
     try:
         place.mkdir(mode=0o700, parents=True, exist_ok=True)
         found = place.stat()
         if hasattr(os, "getuid"):
             if found.st_uid != os.getuid():
-                return None
+                return None, f"{place} belongs to another user"
             if stat.S_IMODE(found.st_mode) & 0o077:
                 place.chmod(0o700)
         if not os.access(place, os.R_OK | os.W_OK | os.X_OK):
-            return None
-    except OSError:
-        return None
+            return None, f"{place} cannot be written"
+    except OSError as error:
+        return None, f"{place}: {error.strerror or error}"
     if getattr(jax.config, "jax_compilation_cache_dir", None) is None:
         jax.config.update("jax_compilation_cache_dir", str(place))
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
-    return place
+    return place, ""
 
 
 def _read(name: str) -> Any:
@@ -280,18 +304,31 @@ class Kept:
     """What the folder holds.
 
     Attributes:
+        folder: Where it is; None where there is none.
+        why: Why there is none.
         programs: How many.
         size: Of all files, bytes.
     """
 
+    folder: Path | None
+    why: str
     programs: int
     size: int
+
+    @property
+    def words(self) -> str:
+        """One sentence."""
+        if self.folder is None:
+            return f"Compiled programs are not kept{f' ({self.why})' if self.why else ''}: each run compiles anew."
+        return f"{self.programs} compiled programs, {self.size / 1e6:.1f} MB, are kept in {self.folder}."
 
 
 def kept() -> Kept:
     """What the folder holds."""
-    files = list(_files(folder()))
-    return Kept(sum(path.suffix == SUFFIX for path, _ in files), sum(found.st_size for _, found in files))
+    place, why = _opened(os.environ.get(FOLDER))
+    files = list(_files(place))
+    count, size = sum(path.suffix == SUFFIX for path, _ in files), sum(found.st_size for _, found in files)
+    return Kept(place, why, count, size)
 
 
 def remove() -> Kept:

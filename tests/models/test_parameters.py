@@ -4,6 +4,7 @@ import dataclasses
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -72,6 +73,19 @@ def test_vector_round_trip() -> None:
     moved = with_vector(toy, jnp.array([1.0, 1.5, 2.0]))
     np.testing.assert_array_equal(moved.weight, [1.0, 1.5])
     assert moved.width == 2.0
+
+
+def test_what_goes_in_as_numpy_comes_out_as_numpy() -> None:
+    """Outside of programs no array is moved to JAX; inside, none is taken from it."""
+    model = fm.model("lambert+ggx", channels=2, kd=np.array([0.1, 0.2]))
+    values = vector(model)
+    assert isinstance(values, np.ndarray)
+    moved = with_vector(model, 2.0 * values)
+    assert isinstance(vector(moved), np.ndarray)
+    np.testing.assert_array_equal(vector(moved), 2.0 * values)
+    traced = vector(with_vector(model, jnp.asarray(values)))
+    assert isinstance(traced, jax.Array)
+    np.testing.assert_array_equal(traced, values)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 import types
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from fitmat.uncertainty.chains import CHUNK, resumable_steps
 from fitmat.uncertainty.posterior import Posterior
 
 STEPS = 250
-"""Of every run here: five parts."""
+"""Of every run here, also where the chain would have been long enough before: five parts."""
 
 PATIENCE = 300.0
 """Seconds that a process may take to begin sampling on a busy machine."""
@@ -35,6 +35,7 @@ sys.path.insert(0, {tests!r})
 import jax
 jax.config.update("jax_enable_x64", True)
 import test_checkpoint as t
+t.chains.SHORTEST = t.STEPS
 t.fm.sample(t.fitted(), seed=1, max_steps=t.STEPS, checkpoint=Path({folder!r}), progress=lambda *_: time.sleep(0.2))
 """
 
@@ -43,6 +44,13 @@ def fitted(seed: int = 1) -> Fit:
     theta = np.linspace(0.0, 1.2, 51)
     value = 0.1 * (1 + 0.02 * np.random.default_rng(seed).normal(size=51))
     return fm.fit(fm.from_arrays(theta, 0.3, value, sigma=np.full(51, 0.002)), "lambert")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def five_parts() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(chains, "SHORTEST", STEPS)
+        yield
 
 
 @pytest.fixture(scope="module")
