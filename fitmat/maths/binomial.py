@@ -10,7 +10,7 @@ from jaxtyping import Float
 def masses(count: int, p: float) -> Float[np.ndarray, " k"]:
     """P(k) of k = 0 … n successes, (n + 1,), to 1e-11 of itself up to a million trials.
 
-    P(k + 1)/P(k) = (n − k)/(k + 1) · p/(1 − p), multiplied in logarithms from the most probable number to both sides, and
+    P(k + 1)/P(k) = (n − k)/(k + 1) · p/(1 − p), multiplied in logarithms from the most probable number outwards and
     normalised to add to 1.
 
     Args:

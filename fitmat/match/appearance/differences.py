@@ -43,14 +43,13 @@ def ciede2000(one: Float[np.ndarray, "... 3"], other: Float[np.ndarray, "... 3"]
     stretch = 1.5 - 0.5 * _saturation((np.hypot(a1, b1) + np.hypot(a2, b2)) / 2)
     c1, c2 = np.hypot(stretch * a1, b1), np.hypot(stretch * a2, b2)
     h1, h2 = (np.rad2deg(np.arctan2(b, stretch * a)) % 360.0 for a, b in ((a1, b1), (a2, b2)))
-    turn, grey = h2 - h1, c1 * c2 == 0.0
+    turn, total = h2 - h1, h1 + h2
+    # Hues more than half a turn apart are closer the other way round, and so is their mean.
     across = np.abs(turn) > 180.0
-    dh = np.where(grey, 0.0, turn - np.where(across, 360.0 * np.sign(turn), 0.0))
-    # The mean of hues that are more than half a turn apart lies on the other side; a grey has none, and 0 in the sum.
-    total = h1 + h2
-    mean = np.where(across, total + np.where(total < 360.0, 360.0, -360.0), total) / 2
-    h = np.where(grey, total, mean)
-    dl, dc, dh = l2 - l1, c2 - c1, 2.0 * np.sqrt(c1 * c2) * np.sin(np.deg2rad(dh / 2))
+    turn = turn - np.where(across, 360.0 * np.sign(turn), 0.0)
+    h = np.where(across, total + np.where(total < 360.0, 360.0, -360.0), total) / 2
+    # A grey has no hue; its chroma of 0 takes away all that depends on one.
+    dl, dc, dh = l2 - l1, c2 - c1, 2.0 * np.sqrt(c1 * c2) * np.sin(np.deg2rad(turn / 2))
     from_middle, c = ((l1 + l2) / 2 - 50.0) ** 2, (c1 + c2) / 2
     t = 1.0 - 0.17 * _cos(h - 30.0) + 0.24 * _cos(2.0 * h) + 0.32 * _cos(3.0 * h + 6.0) - 0.20 * _cos(4.0 * h - 63.0)
     s_l = 1.0 + 0.015 * from_middle / np.sqrt(20.0 + from_middle)
