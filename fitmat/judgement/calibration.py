@@ -12,7 +12,6 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import ArrayLike, Bool, Float, Int
-from scipy.stats import binomtest
 
 from fitmat._types import Progress
 from fitmat.errors import FitmatError
@@ -105,6 +104,8 @@ class Calibration:
 
 def coverage_limits(count: int, hits: int) -> tuple[float, float]:
     """95 % limits of the coverage of which `hits` of `count` were found (Clopper & Pearson 1934)."""
+    from scipy.stats import binomtest
+
     found = binomtest(hits, count).proportion_ci(0.95, method="exact")
     return float(found.low), float(found.high)
 

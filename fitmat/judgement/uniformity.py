@@ -10,7 +10,6 @@ import functools
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.stats import binom
 
 SETS = 20_000
 """Simulated sets of uniform ranks: a probability of 0.001 is known to a fifth of itself."""
@@ -42,6 +41,8 @@ def band(count: int, draws: int, level: float) -> tuple[Float[np.ndarray, " z"],
     Returns:
         Where it is evaluated, z = 1/(L + 1) … L/(L + 1), and its lower and upper limit there, as fractions.
     """
+    from scipy.stats import binom
+
     z = np.arange(1, draws + 1) / (draws + 1)
     gamma = np.quantile(_by_chance(count, draws + 1), 1.0 - level, method="lower")
     return z, np.stack([binom.ppf(gamma / 2, count, z), binom.isf(gamma / 2, count, z)]) / count
@@ -49,6 +50,8 @@ def band(count: int, draws: int, level: float) -> tuple[Float[np.ndarray, " z"],
 
 def _pointwise(count: int, bins: int) -> Float[np.ndarray, "z k"]:
     """Two-sided probability of k = 0 … n ranks below each z."""
+    from scipy.stats import binom
+
     z, k = np.arange(1, bins)[:, None] / bins, np.arange(count + 1)
     return 2.0 * np.minimum(binom.cdf(k, count, z), binom.sf(k - 1, count, z))
 

@@ -109,6 +109,22 @@ def relative_offset(here: Normal, freedom: float) -> Float[Array, ""]:
     size = jnp.sqrt(jnp.diagonal(here.gram))
     scale = jnp.where(size > 0, 1.0 / jnp.where(size > 0, size, 1.0), 0.0)
     gram = here.gram * scale[:, None] * scale + ROUNDING * len(size) * jnp.eye(len(size))
-    inside = jax.scipy.linalg.solve_triangular(jnp.linalg.cholesky(gram), here.slope * scale, lower=True)
-    along = inside @ inside
+    along = here.slope @ (scale * solve(gram, here.slope * scale))
     return jnp.sqrt(freedom * along / jnp.maximum(here.square - along, jnp.finfo(along.dtype).tiny))
+
+
+def solve(matrix: Float[Array, "p p"], right: Float[Array, " p"]) -> Float[Array, " p"]:
+    """x with A x = b for a positive definite A, by Gauss–Jordan elimination; NaN where A is not.
+
+    Without pivots, which such a matrix needs none of, and without LAPACK, which a program would have to be linked to.
+    """
+
+    def eliminated(k: Array, state: tuple[Array, Array]) -> tuple[Array, Array]:
+        table, positive = state
+        pivot = table[k, k]
+        row = table[k] / pivot
+        return (table - table[:, k, None] * row).at[k].set(row), positive & (pivot > 0)
+
+    begin = jnp.concatenate([matrix, right[:, None]], axis=1), jnp.array(True)
+    table, positive = jax.lax.fori_loop(0, len(right), eliminated, begin)
+    return jnp.where(positive, table[:, -1], jnp.nan)

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Bool
 
-from fitmat.maths.least_squares import ROUNDING, Normal
+from fitmat.maths.least_squares import ROUNDING, Normal, solve
 
 FIRST_DAMPING = 1e-3
 """The first λ relative to the diagonal of JᵀJ: starts from a grid are close, and a bad step is taken back."""
@@ -115,6 +115,5 @@ def _ahead(here: Normal, scale: Array, damping: Array) -> tuple[Array, Array]:
     unit = jnp.where(here.square > 0, here.square, 1.0)
     slope, gram = here.slope * scale / unit, here.gram * scale[:, None] * scale / unit
     least = ROUNDING * jnp.trace(gram)
-    factor = jnp.linalg.cholesky(gram + (damping + least) * jnp.eye(len(scale)))
-    step = -jax.scipy.linalg.cho_solve((factor, True), slope)
+    step = -solve(gram + (damping + least) * jnp.eye(len(scale)), slope)
     return step * scale, -unit * (slope @ step + 0.5 * step @ gram @ step)

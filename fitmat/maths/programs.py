@@ -259,6 +259,11 @@ def _opened(chosen: str | None) -> tuple[Path | None, str]:
     return place, ""
 
 
+def _digest(name: str, content: bytes) -> bytes:
+    """Of a file: a whole program under another's name is as wrong as a damaged one."""
+    return hashlib.sha256(name.encode() + content).digest()
+
+
 def _read(name: str) -> Any:
     """An exported program of the folder; None where there is none, or none that is whole."""
     place = folder()
@@ -271,7 +276,7 @@ def _read(name: str) -> Any:
         content = path.read_bytes()
     except OSError:
         return None
-    if hashlib.sha256(content[_DIGEST:]).digest() == content[:_DIGEST]:
+    if _digest(name, content[_DIGEST:]) == content[:_DIGEST]:
         with contextlib.suppress(Exception):
             found = export.deserialize(bytearray(content[_DIGEST:]))
             for used in (path, *place.glob(f"jit_{name}-*")):
@@ -291,7 +296,7 @@ def _write(name: str, exported: Any) -> None:
     content = bytes(exported.serialize())
     draft = place / f".{name}.{os.getpid()}.{threading.get_ident()}"
     try:
-        draft.write_bytes(hashlib.sha256(content).digest() + content)
+        draft.write_bytes(_digest(name, content) + content)
         os.replace(draft, place / f"{name}{SUFFIX}")
         _prune(place)
     except OSError:

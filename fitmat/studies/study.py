@@ -155,9 +155,7 @@ def fit_each(
         corrected: Whether the draws are weighted until they follow the posterior.
         progress: Called with what is done next.
     """
-    if progress is not None:
-        progress(f"fitting {', '.join(jobs) if len(jobs) <= DETAILED else f'{len(jobs)} models'}", 0, 0)
-    return laplace_each(measurements, jobs, seed=seed, corrected=corrected)
+    return laplace_each(measurements, jobs, seed=seed, corrected=corrected, progress=progress)
 
 
 def _pass_over(stream: Stream, jobs: Jobs, seed: int, say: Progress) -> list[Posterior]:

@@ -4,14 +4,15 @@ It walks nowhere; `chains` does. A correction that cannot be relied on is not ma
 """
 
 import dataclasses
-import importlib
+import os
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
+from fitmat._types import Progress
 from fitmat.fitting import fitting
 from fitmat.fitting.coordinates import Coordinates
 from fitmat.fitting.information import inverse_information
@@ -21,6 +22,9 @@ from fitmat.uncertainty.density import log_posterior, physical
 from fitmat.uncertainty.pareto import smoothed
 from fitmat.uncertainty.posterior import GOOD_PARETO, Posterior
 from fitmat.uncertainty.scaled_weights import sampled, scaled_gaussian
+
+NAMED = 4
+"""More models than these are counted where progress is told."""
 
 LAPLACE_DRAWS = 2000
 
@@ -66,7 +70,12 @@ def laplace(fit: Fit, *, seed: int, corrected: bool = True) -> Posterior:
 
 
 def laplace_each(
-    measurements: Measurements, jobs: Mapping[str, Mapping[str, Any]], *, seed: int, corrected: bool = True
+    measurements: Measurements,
+    jobs: Mapping[str, Mapping[str, Any]],
+    *,
+    seed: int,
+    corrected: bool = True,
+    progress: Progress | None = None,
 ) -> list[Posterior]:
     """`fit` and `laplace` of several models, side by side in threads: most of a first fit is compilation.
 
@@ -75,20 +84,26 @@ def laplace_each(
         jobs: Model name → keyword arguments of `fit`.
         seed: Of the draws.
         corrected: As in `laplace`; of no use where the fits are sampled afterwards.
+        progress: Called with what is done next.
 
     Raises:
-        FitmatError: as `fit`, for the first model that cannot be fitted.
+        FitmatError: as `fit`, for a model that cannot be fitted.
     """
 
     def one(name: str) -> Posterior:
         return laplace(fitting.fit(measurements, name, **jobs[name]), seed=seed, corrected=corrected)
 
-    with ThreadPoolExecutor() as pool:
+    words = f"fitting {', '.join(jobs) if len(jobs) <= NAMED else f'{len(jobs)} models'}"
+    say = progress or (lambda *_: None)
+    say(words, 0, len(jobs) if len(jobs) > NAMED else 0)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
         pending = [pool.submit(one, name) for name in jobs]
-        if not corrected:
-            # Slow to load, and this thread has nothing else to do.
-            importlib.import_module("emcee")
-        return [job.result() for job in pending]
+        for done, job in enumerate(as_completed(pending), 1):
+            if job.exception() is not None:
+                pool.shutdown(cancel_futures=True)
+                break
+            say(words, done if len(jobs) > NAMED else 0, len(jobs) if len(jobs) > NAMED else 0)
+        return [job.result() for job in pending if not job.cancelled()]
 
 
 def gaussian(fit: Fit) -> tuple[np.ndarray, np.ndarray]:

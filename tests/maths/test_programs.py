@@ -1,4 +1,4 @@
-"""Programs kept on disk: the numbers of the plain function, whatever lies in the folder; a later process traces none."""
+"""Programs on disk: the numbers of the plain function, whatever lies in the folder; a later process traces none."""
 
 import dataclasses
 import json
@@ -92,16 +92,18 @@ class Run(NamedTuple):
 def started(place: Path | str, package: Path) -> subprocess.Popen[str]:
     """A process that fits, with warnings as errors where they are Python's."""
     environment = {k: v for k, v in os.environ.items() if not k.startswith("JAX_")}
-    environment |= {"FITMAT_CACHE": str(place), "PYTHONPATH": str(package), "PYTHONWARNINGS": "error"}
+    environment |= {"FITMAT_CACHE": str(place), "PYTHONWARNINGS": "error"}
     code = CHILD.format(data=str(DATA), model=FITTED)
     pipe = subprocess.PIPE
-    return subprocess.Popen([sys.executable, "-c", code], env=environment, stdout=pipe, stderr=pipe, text=True)
+    command = [sys.executable, "-c", code]  # which looks for packages where it runs
+    return subprocess.Popen(command, env=environment, cwd=package, stdout=pipe, stderr=pipe, text=True)
 
 
 def ended(process: subprocess.Popen[str]) -> Run:
     out, warned = process.communicate()
     assert process.returncode == 0, warned
     told = json.loads(out)
+    assert Path(told["at"]) != Path(programs.__file__)
     found = told["values"], told["information"], told["result"]
     return Run(found, told["formula"], told["traced"], told["hits"], told["misses"], warned)
 
@@ -236,7 +238,8 @@ def test_a_program_gives_what_the_function_gives(place: Path, given: Arguments, 
     run = one.bound((model,), wi, wo)
     for light, sensor in ((wi, wo), (wo, wi)):
         np.testing.assert_allclose(run(light, sensor), evaluate_pairs(model, light, sensor), rtol=ROUNDING)
-    for other in (fm.model("lambert+phong", channels=2, kd=np.array([0.5, 0.1])), fm.model("lambert"), fm.model("phong")):
+    other_values = fm.model("lambert+phong", channels=2, kd=np.array([0.5, 0.1]))
+    for other in (other_values, fm.model("lambert"), fm.model("phong")):
         np.testing.assert_allclose(one(other, wi, wo), evaluate_pairs(other, wi, wo), rtol=ROUNDING)
 
 
@@ -288,12 +291,12 @@ def test_a_damaged_program_is_replaced(place: Path, given: Arguments, traced: li
 @pytest.mark.parametrize("foreign", ["bytes", "program of other shapes", "program of the same shapes"])
 def test_a_foreign_file_is_replaced(place: Path, given: Arguments, traced: list[str], foreign: str) -> None:
     """Its digest is right, but it is not what its name says."""
-    model, wi, wo = given
+    _, wi, wo = given
     assert_right(given)
     (path,) = files(place)
     if foreign == "bytes":
         content = b"not a module"
-        path.write_bytes(programs.hashlib.sha256(content).digest() + content)
+        path.write_bytes(programs._digest(path.stem, content) + content)
     else:
         count = 5 if "other" in foreign else len(wi)
         other = fm.model("lambert+blinn-phong", channels=2)
@@ -396,7 +399,7 @@ def test_what_was_not_used_for_longest_is_removed(
         made += sorted(set(files(place)) - set(made))
         then = made[-1].stat().st_mtime - age
         os.utime(made[-1], (then, then))
-    first, second, third = made
+    first, _, third = made
     fresh()(model, wi[:2], wo[:2])
     programs._prune(place)
     assert files(place) == sorted(made)
@@ -460,7 +463,8 @@ def test_classes_of_others_are_never_on_disk(place: Path, given: Arguments, trac
     assert len(traced) == 1
     expected = 2.0 * np.asarray(evaluate_pairs(own, wi, wo))
     np.testing.assert_allclose(fresh()(other, wi, wo), expected, rtol=ROUNDING)
-    both = dataclasses.replace(fm.model("lambert+phong", ks=0.0), lobes=(other, *fm.model("lambert+phong", ks=0.0).lobes[1:]))
+    dark: Any = fm.model("lambert+phong", ks=0.0)
+    both = dataclasses.replace(dark, lobes=(other, *dark.lobes[1:]))
     np.testing.assert_allclose(fresh()(both, wi, wo), expected, rtol=ROUNDING)
     assert len(traced) == 1
     assert len(files(place)) == 1

@@ -98,5 +98,3 @@ def test_surfaces_leave_mount_instrument_and_noise_behind() -> None:
     bare, draws = surfaces(model, near(model, 3))
     assert bare.name == base.name
     np.testing.assert_array_equal(draws, near(base, 3))
-
-

@@ -7,8 +7,6 @@ import dataclasses
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial import KDTree
-from scipy.stats import chi2
 
 from fitmat.judgement.examination.coverage import settled
 from fitmat.measurements.samples import IN_PLANE, Measurements
@@ -124,6 +122,8 @@ def _pairs(place: np.ndarray, target: np.ndarray, among: np.ndarray, asking: np.
     """Rows a and b with b's place where a's target is, each pair once, and the distance of those places."""
     if len(among) == 0 or len(asking) == 0:
         return np.zeros(0, int), np.zeros(0, int), np.zeros(0)
+    from scipy.spatial import KDTree
+
     asking = asking[:: -(-len(asking) // MOST_ROWS)]
     asked = KDTree(place[among]).query(target[asking], distance_upper_bound=tolerance)
     distance, found = (np.atleast_1d(part) for part in asked)
@@ -166,10 +166,12 @@ def _agreement(m: Measurements, sigma: np.ndarray, found: tuple, known: bool) ->
     with np.errstate(over="ignore"):
         spread = np.maximum(np.hypot(np.hypot(sigma[a], sigma[b]), slack), np.finfo(float).tiny)
         squares = np.minimum(np.abs((y - z) / spread), CUT) ** 2
+    from scipy.special import chdtrc
+
     # Channels share what is wrong with a direction: they count as one measurement, by their mean square.
     each = both.sum(axis=1)
     square = (squares * both).sum(axis=1)[each > 0] / each[each > 0]
-    differ = bool(chi2.sf(square.sum(), pairs) < SURE and square.mean() > CLEAR)
+    differ = bool(chdtrc(pairs, square.sum()) < SURE and square.mean() > CLEAR)
     return Agreement(pairs, median, worst, float(np.sqrt(square.mean())), differ)
 
 

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.spatial import Delaunay, QhullError
 
 from fitmat.judgement.examination.coverage import Incidence
 from fitmat.measurements.samples import IN_PLANE, Measurements
@@ -129,6 +128,8 @@ def _triangles(local: np.ndarray) -> Rule | None:
         return None
     both = np.concatenate([points, points[aside] * [1.0, -1.0]])
     sample = np.concatenate([first, first[aside]])
+    from scipy.spatial import Delaunay, QhullError
+
     try:
         corners = Delaunay(both).simplices
     except QhullError:
