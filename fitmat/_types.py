@@ -4,8 +4,14 @@ Nothing here computes.
 """
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
-from jaxtyping import Array, Float
+from jaxtyping import Float
+
+if TYPE_CHECKING:
+    from jaxtyping import Array
+else:
+    Array = Any  # it would load JAX, which reading a file does not need
 
 Scalar = Float[Array, ""]
 """One real number."""

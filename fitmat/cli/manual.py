@@ -4,7 +4,9 @@ The pages are the docstrings; nothing is computed here.
 """
 
 import inspect
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 
 from rich.console import Console
 from rich.progress import track
@@ -109,9 +111,12 @@ def check(*, seed: int = 0, only: Callable[[str], bool] = lambda name: True) -> 
     """
     table, surprises = _table("lobe", *laws.LAWS), []
     names = [name for name in LOBES if only(name)]
-    for name in track(names, "checking", console=Console(stderr=True), transient=True):
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        every = pool.map(lambda name: laws.check(model(laws.example(name)), seed=seed), names)
+        checked = zip(names, every, strict=True)
+        measured = list(track(checked, "checking", len(names), console=Console(stderr=True), transient=True))
+    for name, found in measured:
         declared = LOBES[name].breaks
-        found = laws.check(model(laws.example(name)), seed=seed)
         table.add_row(name, *(_verdict(law, finding, law in declared) for law, finding in found.items()))
         if any(not finding.holds and law not in declared for law, finding in found.items() if law != "furnace"):
             surprises.append(name)

@@ -3,13 +3,17 @@
 It holds no formula.
 """
 
+import sys
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 
 def library(*values: Any) -> Any:
-    """`jax.numpy` where a value is a JAX array, else NumPy."""
-    return jnp if any(isinstance(value, jax.Array) for value in values) else np
+    """`jax.numpy` where a value is a JAX array, else NumPy; where JAX was not loaded, no value is one."""
+    kind = getattr(sys.modules.get("jax"), "Array", ())
+    if any(isinstance(value, kind) for value in values):
+        import jax.numpy as jnp
+
+        return jnp
+    return np

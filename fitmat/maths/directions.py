@@ -20,11 +20,10 @@ Nothing here knows about reflectance.
 
 from typing import Any, NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Bool, Float
 
-from fitmat._types import Scalar, Vec3
+from fitmat._types import Array, Scalar, Vec3
 from fitmat.maths.arrays import library
 
 COS_MIN = 1e-7
@@ -66,13 +65,15 @@ def half_vector(wi: Vec3, wo: Vec3) -> Vec3:
     total = wi + wo
     square = _dot(total, total)
     usable = square > 1e-24
-    safe = jnp.where(usable, square, 1.0)
-    return jnp.where(usable, total / jnp.sqrt(safe), jnp.array([0.0, 0.0, 1.0]))
+    xp = library(square)
+    safe = xp.where(usable, square, 1.0)
+    return xp.where(usable, total / xp.sqrt(safe), np.array([0.0, 0.0, 1.0]))
 
 
 def cos_difference(wi: Vec3, wo: Vec3) -> Scalar:
     """c_d = ω_i·h = √((1 + ω_i·ω_o)/2), in [0, 1]."""
-    return jnp.sqrt(jnp.clip((1.0 + _dot(wi, wo)) / 2.0, _TINY, 1.0))
+    xp = library(wi, wo)
+    return xp.sqrt(xp.clip((1.0 + _dot(wi, wo)) / 2.0, _TINY, 1.0))
 
 
 class Pair(NamedTuple):
@@ -105,7 +106,7 @@ def rotated(w: Float[Any, "3"], angle: Float[Any, ""]) -> Float[Any, "3"]:
 
 def mirror(direction: Vec3) -> Vec3:
     """The mirror direction 2(n·ω)n − ω."""
-    return direction * jnp.array([-1.0, -1.0, 1.0])
+    return direction * np.array([-1.0, -1.0, 1.0])
 
 
 def above(wi: Vec3, wo: Vec3) -> Bool[Array, ""]:

@@ -125,6 +125,8 @@ def solve(matrix: Float[Array, "p p"], right: Float[Array, " p"]) -> Float[Array
         row = table[k] / pivot
         return (table - table[:, k, None] * row).at[k].set(row), positive & (pivot > 0)
 
+    if not len(right):
+        return right
     begin = jnp.concatenate([matrix, right[:, None]], axis=1), jnp.array(True)
     table, positive = jax.lax.fori_loop(0, len(right), eliminated, begin)
     return jnp.where(positive, table[:, -1], jnp.nan)

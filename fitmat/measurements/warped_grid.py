@@ -10,7 +10,8 @@ import dataclasses
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import ArrayLike, Bool, Float
+from jaxtyping import Bool, Float
+from numpy.typing import ArrayLike
 
 from fitmat.errors import ModelError
 from fitmat.maths.directions import from_angles, zenith

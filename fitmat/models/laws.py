@@ -10,12 +10,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.maths.programs import program
+from fitmat.maths.programs import program_run_once
 from fitmat.models.albedo import albedo
-from fitmat.models.base import AbstractBRDF, evaluate_pairs
+from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import Entry, bounds, entries, vector, with_vector
 from fitmat.models.registry import LOBES, OVER
 from fitmat.models.terms.fresnel import AbstractFresnel, White
+from fitmat.models.values import values
 
 LAWS = {
     "positive": "f ≥ 0 for all directions",
@@ -79,9 +80,9 @@ def check(template: AbstractBRDF, *, seed: int) -> dict[str, Finding]:
         Law → finding, in the order of `LAWS`.
     """
     rng = np.random.default_rng(seed)
-    values = _drawn(template, rng)
-    smallest, gap = _signs(template, values, *_pairs(rng))
-    reflected = [albedo(with_vector(template, v), ANGLES) for v in values]
+    draws = _drawn(template, rng)
+    smallest, gap = _signs(template, draws, *_pairs(rng))
+    reflected = [albedo(with_vector(template, v), ANGLES) for v in draws]
     above = max(float((a.value - a.error).max()) for a in reflected)
     white = albedo(_white(template), ANGLES).value.ravel()
     worst = float(white[np.argmax(np.abs(white - 1.0))])
@@ -124,12 +125,12 @@ def _white(template: AbstractBRDF) -> AbstractBRDF:
     """The model with everything that can be white at white, and rough."""
     if isinstance(getattr(template, "fresnel", None), AbstractFresnel):
         template = dataclasses.replace(template, fresnel=White())  # pyright: ignore[reportCallIssue]
-    values = np.array(vector(template))
+    whole = np.array(vector(template))
     for entry in entries(template):
         wanted = (WHITE | ROUGH).get(entry.name.rpartition(".")[2])
         if wanted is not None:
-            values[entry.place] = wanted
-    return with_vector(template, values)
+            whole[entry.place] = wanted
+    return with_vector(template, whole)
 
 
 def _pairs(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -143,15 +144,13 @@ def _pairs(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     return wi, wo
 
 
-@program
-def _signs(template: AbstractBRDF, values: Array, wi: Array, wo: Array) -> tuple[Array, Array]:
+def _signs(
+    template: AbstractBRDF, draws: np.ndarray, wi: np.ndarray, wo: np.ndarray
+) -> tuple[np.floating, np.floating]:
     """The smallest value, and the largest gap between the two directions relative to their sum."""
-
-    def one(v: Array) -> Array:
-        return evaluate_pairs(with_vector(template, v), jnp.concatenate([wi, wo]), jnp.concatenate([wo, wi]))
-
-    there, back = jnp.split(jax.lax.map(one, values), 2, axis=1)
-    return jnp.min(there), jnp.max(jnp.abs(there - back) / (jnp.abs(there) + jnp.abs(back) + 1e-30))
+    there, back = (values(template, draws, *pair) for pair in ((wi, wo), (wo, wi)))
+    smallest = np.minimum(there.min(), back.min())
+    return smallest, np.max(np.abs(there - back) / (np.abs(there) + np.abs(back) + 1e-30))
 
 
 def singular() -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -196,7 +195,7 @@ def unbounded(template: AbstractBRDF) -> int:
     return int(_not_finite(template, np.array(rows), wi, wo))
 
 
-@program
+@program_run_once
 def _not_finite(template: AbstractBRDF, values: Array, wi: Array, wo: Array) -> Array:
     def total(v: Array, a: Array, b: Array) -> Array:
         return jnp.sum(with_vector(template, v)(a, b))

@@ -15,7 +15,6 @@ from fitmat.fitting.result import Fit
 from fitmat.judgement.fit_metrics import fit_metrics
 from fitmat.match import sentences
 from fitmat.match.ablation import EXPLAINS, TERMS, Ablation
-from fitmat.match.appearance import spheres
 from fitmat.match.discernibility import SEPARATED, Telling
 from fitmat.match.distances import METRICS
 from fitmat.match.imitation import Imitation
@@ -211,14 +210,15 @@ def test_the_match_asks_what_an_eye_sees(fits: tuple[Fit, Fit], monkeypatch: pyt
     """With the best fits in the first row, and its sentence in the verdict."""
     asked = []
 
-    def look(*given: Any) -> Any:
-        asked.append(given)
+    def look(*given: Any, pictures: bool) -> Any:
+        asked.append((*given, pictures))
         return type("Seen", (), {"words": "An eye would wonder."})()
 
-    monkeypatch.setattr(spheres, "perceived", look)
+    monkeypatch.setattr("fitmat.match.match.perceived", look)
     found = compare(*(fm.laplace(fit, seed=1) for fit in fits))
-    empirical, microfacet, draws, channels = asked[0]
+    empirical, microfacet, draws, channels, pictures = asked[0]
     assert (empirical.name, microfacet.name, channels) == ("lambert+blinn-phong", "lambert+ggx", ("value",))
+    assert not pictures
     for fit, values in zip(fits, draws, strict=True):
         assert np.asarray(values[0]) == pytest.approx(fit.values)
     assert "An eye would wonder." in found.verdict

@@ -11,13 +11,14 @@ import pytest
 from jaxtyping import Array
 from oracles.nist_strd import DANWOOD, FORMULAS, MISRA1A, Problem, read_problem
 
-from fitmat.maths.least_squares import Minimum, least_squares
+from fitmat.maths.least_squares import Minimum, least_squares, solve
 
 DIGITS = 6.0
 """Correct digits asked for: what NIST calls a good result; half of what float64 Jacobians of these problems allow."""
 
 SAME = 1e-9
-"""Relative; Σ r² of two routes to one minimum, each converged to a step below 1e-12 of the parameter's own scale."""
+"""Relative; Σ r² of two routes to one minimum, each converged to a step below 1e-12 of the parameter's own scale;
+solutions of systems whose condition is far below 1e6."""
 
 FAR_FAILURES = {"BoxBOD", "MGH10", "MGH17"}
 """Problems whose far start leads Levenberg–Marquardt to a plateau or another minimum; NIST calls all three hard."""
@@ -151,3 +152,26 @@ def test_a_start_at_the_minimum_stays() -> None:
     """Zero residuals and a parameter that nothing depends on would divide by zero if taken as units."""
     end = least_squares(lambda b, _: jnp.array([b[0] - 2.0, 3.0 * (b[0] - 2.0)]), jnp.array([2.0, 5.0]))
     np.testing.assert_array_equal(end.x, [2.0, 5.0])
+
+
+def test_nothing_to_move_is_a_minimum() -> None:
+    """Where all is fixed."""
+    end = least_squares(lambda b, _: jnp.array([3.0, 4.0]), jnp.zeros(0))
+    assert end.solved
+    assert (end.x.shape, float(end.square)) == ((0,), 25.0)
+
+
+@pytest.mark.parametrize("size", [1, 2, 7])
+def test_systems_are_solved_as_numpy_does(size: int) -> None:
+    """Condition numbers of some hundred."""
+    rng = np.random.default_rng(size)
+    root, right = rng.normal(size=(size, size + 3)), rng.normal(size=size)
+    matrix = root @ root.T
+    np.testing.assert_allclose(
+        solve(jnp.asarray(matrix), jnp.asarray(right)), np.linalg.solve(matrix, right), rtol=SAME
+    )
+
+
+@pytest.mark.parametrize("matrix", [[[1.0, 2.0], [2.0, 1.0]], [[0.0, 0.0], [0.0, 1.0]], [[1.0, np.nan], [np.nan, 1.0]]])
+def test_what_is_not_positive_definite_has_no_solution(matrix: list[list[float]]) -> None:
+    assert np.isnan(solve(jnp.array(matrix), jnp.ones(2))).all()

@@ -32,7 +32,7 @@ def measurements() -> Measurements:
 
 @pytest.fixture(scope="module")
 def studied(measurements: Measurements) -> Study:
-    return study(measurements, NAMES, sampling=False)
+    return study(measurements, NAMES, sampling=False, full=True)
 
 
 def test_a_study_holds_one_noun_for_each_model(studied: Study, measurements: Measurements) -> None:
@@ -87,6 +87,8 @@ def test_everything_is_computed_once_and_then_read(
         counted(module, name)
     counted(room, "compare")
     found = study(measurements, NAMES, sampling=False)
+    assert found.match is not None
+    assert found.match.imitations == ()  # which only a full study asks for
     record.to_dict(found)
     page.write(tmp_path, found)
     terminal.show(found, tmp_path)

@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float
 from fitmat.fitting.result import Fit
 from fitmat.judgement.prediction import sections
 from fitmat.maths.directions import from_angles
+from fitmat.models.values import widths
 
 Measured = Literal["sample", "curve"]
 """A single sample, or one incidence with a scan of theta_o."""
@@ -106,7 +107,7 @@ def proposed(fit: Fit, kind: Measured, limits: Limits) -> Candidates:
 
 def _samples(fit: Fit, zenith: np.ndarray) -> Candidates:
     """A grid in the plane of incidence and outside of it, with more points on the flanks of the lobe."""
-    aside = np.concatenate([-np.array(FLANK[::-1]), FLANK]) * 2.0 * float(fit.model.width())
+    aside = np.concatenate([-np.array(FLANK[::-1]), FLANK]) * 2.0 * float(widths(fit.model, fit.values[None])[0])
     found = [(i, o, np.pi) for i in zenith for o in np.unique(np.concatenate([-zenith, zenith]))]
     found += [(i, i + a, np.pi) for i in zenith for a in aside]
     found += [(i, o, phi) for i in zenith[1:] for o in zenith[1:] for phi in np.deg2rad(AZIMUTHS)]
