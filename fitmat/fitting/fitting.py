@@ -61,7 +61,7 @@ SAME = 1e-3
 STEADY = 1e-4
 """Relative offset (Bates & Watts 1981, who ask for 1e-3) at which a fit has converged even if its last digits move."""
 
-SETTLED = 1e-5
+SETTLED = 1e-6
 """Relative change of the discrepancy at which the alternation ends."""
 
 

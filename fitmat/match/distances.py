@@ -20,7 +20,7 @@ from fitmat.uncertainty.estimate import Estimate, band, estimate
 AZIMUTHS = 4
 """Azimuths of incidence over half a turn, where a model is anisotropic."""
 
-COARSE = (ZENITH_NODES // 2, AZIMUTH_NODES // 2)
+COARSE = (24, 12)
 """Nodes behind the spread of the draws; the best fits are integrated with all nodes."""
 
 ANGLES = np.deg2rad(np.arange(0.0, 86.0, 5.0))

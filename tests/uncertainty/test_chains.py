@@ -132,7 +132,7 @@ def test_short_chains_are_said_to_be_short(fit: Fit) -> None:
     assert short.verdict == "tentative"
     assert short.usable
     assert short.diagnostics is not None
-    assert short.diagnostics.steps == 250
+    assert short.diagnostics.steps == 100
 
 
 def diagnosed(sampled: Posterior, **changes: object) -> str:
