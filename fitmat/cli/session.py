@@ -58,7 +58,7 @@ class Watch:
         """Say that a program is compiled, which happens once."""
         words = f"compiling {what}, once for this machine"
         if self._bar is not None:
-            self._bar.update(self._task, description=f"{self._stage}: {words}" if self._stage else words)
+            self._bar.update(self._task, description=f"{self._stage}: {words}" if self._stage else words, refresh=True)
         elif words not in self._told:
             self._told.add(words)
             self._say(words)
@@ -68,6 +68,7 @@ class Watch:
         if self._bar is not None:
             self._bar.remove_task(self._task)
             self._task = self._bar.add_task(what, total=None)
+            self._bar.refresh()
         if self._bar is None or "resumed" in what:
             self._say(f"{what[0].upper()}{what[1:]}.")
         if sampling and self._before is None:

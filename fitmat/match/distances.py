@@ -135,14 +135,19 @@ def _first(pair: tuple[Draws, Draws]) -> tuple[Draws, Draws]:
 
 
 def _spread_about(best: Integrals, draws: Integrals) -> Integrals:
-    """Integrals of draws by a coarse rule, each by as much too large or small as that of the best fit was."""
+    """Integrals of draws by a coarse rule, each by as much too large or small as that of the best fit was.
+
+    Where the coarse rule has no node in a region, the draws change there as they do over all regions together.
+    """
 
     def corrected(exact: np.ndarray, coarse: np.ndarray) -> np.ndarray:
-        usable = (coarse[:1] > 0) & (exact > 0)
-        return np.where(usable, coarse * exact / np.where(usable, coarse[:1], 1.0), coarse + exact - coarse[:1])
+        whole = coarse.sum(axis=-1, keepdims=True)
+        seen, any_seen = coarse[:1] > 0, whole[:1] > 0
+        change = np.where(seen, coarse / np.where(seen, coarse[:1], 1.0), whole / np.where(any_seen, whole[:1], 1.0))
+        return exact * change
 
     top, bottom, albedos = (corrected(*parts) for parts in zip(best, draws, strict=True))
-    return np.maximum(top, 0.0), np.maximum(bottom, 0.0), albedos
+    return top, bottom, albedos
 
 
 def _integrals(

@@ -15,6 +15,7 @@ import stat
 import threading
 import types
 import warnings
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
@@ -39,6 +40,8 @@ HASTE = {"xla_backend_optimization_level": 0}
 
 SUFFIX = ".program"
 """How the names of exported modules end."""
+
+_ZSTD = b"\x28\xb5\x2f\xfd"
 
 _DIGEST = hashlib.sha256().digest_size
 
@@ -73,7 +76,8 @@ class Program:
 
     def _found(self, leaves: list[Any], structure: Any, arrays: list[Any], given: Any) -> Callable[..., Any]:
         rest = tuple(None if isinstance(leaf, _ARRAYS) else leaf for leaf in leaves)
-        key = (structure, rest, tuple((array.shape, array.dtype) for array in arrays))
+        kinds = tuple(map(type, rest))  # 1, 1.0 and True are equal
+        key = (structure, rest, kinds, tuple((array.shape, array.dtype) for array in arrays))
         run = self._ready.get(key)
         return self._made(key, given, arrays) if run is None else run
 
@@ -103,7 +107,7 @@ class Program:
         return self._ready[key]
 
     def _load_or_compile(self, key: Any, given: tuple[tuple, dict], arrays: list[Any]) -> Callable[..., Any]:
-        structure, rest, _ = key
+        structure, rest, *_ = key
 
         def flat(*found: Any) -> Any:
             following = iter(found)
@@ -269,6 +273,8 @@ def _opened(chosen: str | None) -> tuple[Path | None, str]:
     if getattr(jax.config, "jax_compilation_cache_dir", None) is None:
         jax.config.update("jax_compilation_cache_dir", str(place))
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+        # JAX writes in place: what another process is writing is compiled once more.
+        warnings.filterwarnings("ignore", message="Error (reading|writing) persistent compilation cache entry")
     return place, ""
 
 
@@ -284,6 +290,7 @@ def _read(name: str) -> Any:
         return None
     from jax import export
 
+    _mend(place, name)
     path = place / f"{name}{SUFFIX}"
     try:
         content = path.read_bytes()
@@ -299,6 +306,19 @@ def _read(name: str) -> Any:
     with contextlib.suppress(OSError):
         path.unlink()
     return None
+
+
+def _mend(place: Path, name: str) -> None:
+    """Remove what XLA compiled of a program where it cannot be unpacked: JAX would complain, and keep it for ever."""
+    for entry in place.glob(f"jit_{name}-*"):
+        with contextlib.suppress(OSError):
+            content = entry.read_bytes()
+            if content[: len(_ZSTD)] == _ZSTD:  # not looked into
+                continue
+            try:
+                zlib.decompress(content)
+            except zlib.error:
+                entry.unlink()
 
 
 def _write(name: str, exported: Any) -> None:
@@ -376,8 +396,3 @@ def _prune(place: Path) -> None:
         with contextlib.suppress(OSError):
             path.unlink()
             excess -= found.st_size
-
-
-def quiet() -> None:
-    """Ignore JAX's warnings of cache entries that it cannot read: they are made anew."""
-    warnings.filterwarnings("ignore", message="Error (reading|writing) persistent compilation cache entry")

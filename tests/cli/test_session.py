@@ -7,7 +7,6 @@ import signal
 import numpy as np
 import pytest
 from rich.console import Console
-from rich.progress import Progress
 
 import fitmat
 from fitmat.cli import session
@@ -89,7 +88,38 @@ def test_ctrl_c_is_given_back_after_sampling(stage):
 
 def test_a_run_that_goes_on_says_so(monkeypatch):
     written = io.StringIO()
-    told = session.Watch(Progress(console=Console(file=written, width=80), disable=True))
+    told = session.Watch(Console(file=written, width=80, force_terminal=True))
+    told.open("loading")
     told("sampling ggx, resumed at step 1,000", 1000, 0)
     told.close()
-    assert written.getvalue() == "Sampling ggx, resumed at step 1,000.\n"
+    assert "Sampling ggx, resumed at step 1,000.\n" in written.getvalue()
+
+
+def test_a_line_a_stage_where_nobody_watches():
+    """A pipe, and a terminal that cannot move its cursor: nothing is wrapped, nothing is said twice."""
+    name = "lambert+" + "a-very-long-name-" * 8
+    for given in ({"force_terminal": False}, {"force_terminal": True, "_environ": {"TERM": "dumb"}}):
+        written = io.StringIO()
+        told = session.Watch(Console(file=written, width=40, **given))
+        told.open("loading")
+        for done in range(3):
+            told(f"fitting {name}", done, 3)
+            told.compiling(name)
+        told("comparing", 0, 0)
+        told.close()
+        lines = written.getvalue().splitlines()
+        assert lines == [f"Fitting {name}.", f"compiling {name}, once for this machine", "Comparing."]
+
+
+def test_the_line_at_a_terminal_is_never_blank():
+    written = io.StringIO()
+    told = session.Watch(Console(file=written, width=100, force_terminal=True))
+    told.open("loading")
+    told("fitting ggx", 0, 0)
+    told.compiling("ggx")
+    told("sampling ggx", 50, 200)
+    told.close()
+    shown = written.getvalue()
+    assert all(
+        words in shown for words in ("loading", "fitting ggx", "compiling ggx, once for this machine", "sampling ggx")
+    )

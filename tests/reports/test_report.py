@@ -48,7 +48,7 @@ def paint() -> Measurements:
 
 @pytest.fixture(scope="module")
 def studied() -> Study:
-    return study(paint(), NAMES, sampling=False)
+    return study(paint(), NAMES, sampling=False, full=True)
 
 
 def alone(posterior: Posterior) -> Study:
