@@ -112,7 +112,7 @@ def nonnegative(gram: Float[np.ndarray, "... k k"], moment: Float[np.ndarray, ".
             w[..., k] = np.where(used[..., k], np.maximum(best, 0.0), 0.0)
         if not (np.abs(w - before) > STILL * np.abs(w)).any():
             break
-    lit = np.greater(w, 0.0)
+    lit: np.ndarray = np.greater(w, 0.0)
     among = lit[..., :, None] & lit[..., None, :]
     with np.errstate(all="ignore"):
         # A ridge at the level of rounding: of columns that are alike any solution is one.

@@ -5,7 +5,9 @@ looks for no other optimum than the one that the part shows.
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple, TypeVar
 
 import jax
@@ -17,9 +19,9 @@ from fitmat.fitting import fitting
 from fitmat.fitting.information import FOLLOWS, covariance, expected_information, is_positive, observed_information
 from fitmat.fitting.likelihood import NEGLIGIBLE, Data
 from fitmat.fitting.result import Fit, named_outcome
-from fitmat.fitting.streamed_sums import Sums, block_sums, blocks, prior_sums
+from fitmat.fitting.streamed_sums import Sums, block_curvature, block_sums, blocks, prior_sums
 from fitmat.measurements.large.noise import Scatter, scatter
-from fitmat.measurements.large.stream import Stream
+from fitmat.measurements.large.stream import Held, Stream
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector, with_vector
 
@@ -28,7 +30,7 @@ T = TypeVar("T")
 PASSES = 20
 """At most this many passes over the file; three or four are usual."""
 
-SETTLED = 1e-5
+SETTLED = 1e-4
 """A Newton step of this many standard errors is the last one."""
 
 NEAR = 0.1
@@ -44,8 +46,36 @@ NO_CURVATURE = 1e-11
 """Eigenvalue of the scaled curvature below which a direction is left where it is: rounding, not data, moves it."""
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Rows:
+    """A file's rows as the likelihood sees them, for fits of several models.
+
+    Attributes:
+        chunks: The file.
+        known: Its noise.
+        prepared: Blocks of all rows, where these are in memory; else None, and they are made in each pass.
+    """
+
+    chunks: Stream
+    known: Scatter
+    prepared: tuple[Data, ...] | None
+
+
+def rows(chunks: Stream, progress: Progress | None = None) -> Rows:
+    """The rows of a file, its noise estimated.
+
+    Args:
+        chunks: A file, from `large.chunks.scan`, or measurements in memory, from `large.stream.hold`.
+        progress: Called after each chunk.
+    """
+    known = scatter(chunks, progress)
+    held = isinstance(chunks, Held)
+    prepared = tuple(data for chunk in chunks for data in blocks(chunk, known.of(chunk))) if held else None
+    return Rows(chunks, known, prepared)
+
+
 def fit_chunks(
-    chunks: Stream,
+    chunks: Stream | Rows,
     to: str | AbstractBRDF,
     *,
     fixed: Mapping[str, ArrayLike] | None = None,
@@ -59,7 +89,7 @@ def fit_chunks(
     together to the maximum of the likelihood of all rows; bounds are kept by projection (Bertsekas 1982, eq. 32).
 
     Args:
-        chunks: A file, from `large.chunks.scan`, or measurements in memory, from `large.stream.hold`.
+        chunks: A file, from `large.chunks.scan`, or measurements in memory, from `large.stream.hold`; or `rows` of one.
         to: A model name ("lambert+ggx"), or a model whose shapes and static choices are used.
         fixed: Parameters to hold, by name: `{"ks": 1.0}`.
         priors: What is known beforehand, by name, as in `fitting.fit`.
@@ -72,38 +102,45 @@ def fit_chunks(
     Raises:
         FitmatError: as `fitting.fit`, and ReadError where the file changed since `scan`.
     """
-    known = scatter(chunks, progress)
-    part_noise = known.of_part(chunks.part)
-    start = fitting.fit(
-        dataclasses.replace(chunks.part, sigma=part_noise.sigma), to, fixed=fixed, priors=priors, masking=masking
-    )
-    start = dataclasses.replace(start, measurements=chunks.part, noise=part_noise)
+    every = chunks if isinstance(chunks, Rows) else rows(chunks, progress)
+    part = every.chunks.part
+    noise = every.known.of_part(part)
+    start = fitting.fit(dataclasses.replace(part, sigma=noise.sigma), to, fixed=fixed, priors=priors, masking=masking)
+    start = dataclasses.replace(start, measurements=part, noise=noise)
     if not start.finite:
         return start
-    file, around = _File(chunks, known, start, progress), _Range(start)
+    file, around = _File(every, start, progress), _Range(start)
     return _concluded(file, around, _climb(file, around))
 
 
 class _File(NamedTuple):
-    """What a pass needs: the chunks, their noise, the fit of the part, and whom to tell."""
+    """What a pass needs: the rows, the fit of the part, and whom to tell."""
 
-    chunks: Stream
-    known: Scatter
+    rows: Rows
     start: Fit
     progress: Progress | None
 
     def added(self, of: Callable[[Data], T], what: str) -> T:
-        """The sum of `of` over all rows, block by block."""
+        """The sum of `of` over all rows, a few blocks at a time side by side, added in their order."""
         total, done = None, 0
-        for chunk in self.chunks:
-            for data in blocks(chunk, self.known.of(chunk)):
-                found = of(data)
-                total = found if total is None else jax.tree.map(np.add, total, found)
-            done += chunk.n_samples
-            if self.progress is not None:
-                self.progress(what, done, self.chunks.n_samples)
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            for count, some in self._parts():
+                for found in pool.map(of, some):
+                    total = found if total is None else jax.tree.map(np.add, total, found)
+                done += count
+                if self.progress is not None:
+                    self.progress(what, done, self.rows.chunks.n_samples)
         assert total is not None
         return total
+
+    def _parts(self) -> Iterator[tuple[int, Sequence[Data]]]:
+        """How many rows, and their blocks."""
+        every = self.rows
+        if every.prepared is not None:
+            yield every.chunks.n_samples, every.prepared
+        else:
+            for chunk in every.chunks:
+                yield chunk.n_samples, list(blocks(chunk, every.known.of(chunk)))
 
     def sums(self, best: AbstractBRDF, s: float, what: str) -> Sums:
         """The sums of all rows and of the prior."""
@@ -142,11 +179,14 @@ class _Range:
         values[self._free] = np.clip(values[self._free], self._moved.lower, self._moved.upper)
         return with_vector(self._start.model, values)
 
-    def second_order(self, n_valid: int) -> Float[np.ndarray, "p p"]:
+    def second_order(self, best: AbstractBRDF, s: float, n_valid: int) -> Float[np.ndarray, "p p"]:
         """What residuals × their curvature add to JᵀJ of so many values, estimated from the part; 0 if negligible."""
         start = self._start
-        first = expected_information(start.model, start.data, start.discrepancy)
-        return (start.information - first) * n_valid / start.measurements.n_valid
+        if s < FOLLOWS * float(start.data.typical):
+            return np.zeros_like(start.information)
+        first = expected_information(best, start.data, s)
+        both = observed_information(best, start.data, s, first)
+        return (both - first) * n_valid / start.measurements.n_valid
 
     def step(self, x: np.ndarray, sums: Sums, more: np.ndarray, damping: float) -> tuple[np.ndarray, float]:
         """The projected Newton step from x, and its length in standard errors."""
@@ -194,7 +234,8 @@ def _climb(file: _File, around: _Range) -> _Top:
     """Newton's method with damping after steps that made things worse (Levenberg 1944)."""
     x, damping = around.begin, 0.0
     kept = file.sums(around.model(x), x[-1], "pass 1")
-    more = around.second_order(file.chunks.n_valid)
+    n_valid = file.rows.chunks.n_valid
+    more = around.second_order(around.model(x), x[-1], n_valid)
     for k in range(2, PASSES + 1):
         step, length = around.step(x, kept, more, damping)
         tried = x + step
@@ -208,6 +249,7 @@ def _climb(file: _File, around: _Range) -> _Top:
         damping = (damping / 3.0 if damping > DAMPING else 0.0) if better else max(10.0 * damping, DAMPING)
         if better:
             x, kept = tried, sums
+            more = around.second_order(around.model(x), x[-1], n_valid)
     return _Top(x, kept, PASSES, False)
 
 
@@ -216,7 +258,7 @@ def _concluded(file: _File, around: _Range, top: _Top) -> Fit:
     start, best, s = file.start, around.model(top.x), float(top.x[-1])
     information, free = np.asarray(top.sums.gram), start.free
     if s >= FOLLOWS * float(start.data.typical):
-        observed = file.added(lambda data: observed_information(best, data, s, information), "curvature")
+        observed = file.added(lambda data: block_curvature(best, data, s), "curvature")
         observed = observed + prior_sums(best, start.data, s).gram
         information = observed if is_positive(observed[np.ix_(free, free)]) else information
     spread, undetermined = covariance(best, information, start.coordinates, start.data.told(free))
@@ -231,7 +273,7 @@ def _concluded(file: _File, around: _Range, top: _Top) -> Fit:
         information=information,
         covariance=spread,
         undetermined=undetermined,
-        n_values=file.chunks.n_valid,
+        n_values=file.rows.chunks.n_valid,
         misfit=s,
         discrepancy_sd=_discrepancy_sd(top.sums),
     )

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike
+from jaxtyping import Array, ArrayLike, Float
 
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.likelihood import Data, log_likelihood, prepare, residuals
@@ -69,6 +69,22 @@ def _block_sums(best: AbstractBRDF, data: Data, s: ArrayLike) -> tuple[Array, ..
     (gradient, gram), (mixed, _) = jax.jvp(by_parameter, (s,), (jnp.ones_like(s),))
     (change, cost), (curvature, _) = jax.jvp(slope, (s,), (jnp.ones_like(s),))
     return cost, gradient, gram, change, mixed, curvature
+
+
+def block_curvature(best: AbstractBRDF, data: Data, s: float) -> Float[np.ndarray, "p p"]:
+    """The Hessian of ½Σ residual² of one block in natural coordinates."""
+    return np.asarray(_block_curvature(best, data, np.asarray(s)))
+
+
+@program
+def _block_curvature(best: AbstractBRDF, data: Data, s: ArrayLike) -> Array:
+    every, values = coordinates(best), vector(best)
+
+    def cost(t: Array) -> Array:
+        r = residuals(every.model(best, values, t), data, jnp.asarray(s))
+        return 0.5 * jnp.vdot(r, r)
+
+    return jax.jacfwd(jax.grad(cost))(every.natural(values))
 
 
 def prior_sums(best: AbstractBRDF, data: Data, s: float) -> Sums:

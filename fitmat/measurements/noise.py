@@ -139,9 +139,8 @@ def curves(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray, np.nd
     flat = np.minimum(m.phi, np.pi - m.phi) < IN_PLANE
     flat |= np.minimum(m.theta_i, m.theta_o) < _TOGETHER
     side = np.where(flat & (m.phi < np.pi / 2), -1.0, 1.0)
-    plane = np.where(flat, 0.0, np.round(np.rad2deg(m.phi), 2))[rows]
-    keys = np.stack([np.round(np.rad2deg(still[rows]), 2), plane], axis=1)
-    curve = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)
+    hundredths = np.round(100.0 * np.rad2deg(np.stack([still, np.where(flat, 0.0, m.phi)])[:, rows]))
+    curve = np.unique(hundredths[0] * 100_000.0 + hundredths[1], return_inverse=True)[1].reshape(-1)
     angle = (side * moving)[rows]
     order = np.lexsort((angle, curve))
     return rows[order], curve[order], angle[order]

@@ -14,7 +14,7 @@ from jaxtyping import ArrayLike
 from fitmat._types import Progress
 from fitmat.errors import ModelError
 from fitmat.fitting.losses import DEFAULT
-from fitmat.fitting.streamed import fit_chunks
+from fitmat.fitting.streamed import fit_chunks, rows
 from fitmat.judgement.choice import Choice, choose
 from fitmat.judgement.identifiability.verdicts import identify
 from fitmat.judgement.prediction import sections
@@ -164,13 +164,14 @@ def _pass_over(stream: Stream, jobs: Jobs, seed: int, say: Progress) -> list[Pos
     if loss != DEFAULT.name:
         raise ModelError(f"--loss {loss}: more than {MOST_AT_ONCE:,} rows are fitted under the default loss only.")
     found = []
+    every = rows(stream, lambda step, done, total: say(f"reading: {step}", done, total))
     for name, job in jobs.items():
         told = {key: value for key, value in job.items() if key != "loss"}
 
         def passing(step: str, done: int, total: int, name: str = name) -> None:
             say(f"fitting {name}: {step}", done, total)
 
-        found.append(laplace(fit_chunks(stream, name, **told, progress=passing), seed=seed))
+        found.append(laplace(fit_chunks(every, name, **told, progress=passing), seed=seed))
     return found
 
 
