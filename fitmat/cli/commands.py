@@ -312,4 +312,5 @@ def cache(
     """Say where compiled programs are kept and how many there are; they spare each run the compiling of the first."""
     from fitmat.maths import programs
 
-    typer.echo(programs.remove().words if clear else programs.kept().words)
+    found = programs.remove() if clear else programs.kept()
+    typer.echo(found.words.replace("are kept in", "were removed from the folder") if clear else found.words)

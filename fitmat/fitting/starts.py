@@ -112,13 +112,13 @@ def nonnegative(gram: Float[np.ndarray, "... k k"], moment: Float[np.ndarray, ".
             w[..., k] = np.where(used[..., k], np.maximum(best, 0.0), 0.0)
         if not (np.abs(w - before) > STILL * np.abs(w)).any():
             break
-    lit: np.ndarray = np.greater(w, 0.0)
+    lit = np.asarray(w > 0)
     among = lit[..., :, None] & lit[..., None, :]
     with np.errstate(all="ignore"):
         # A ridge at the level of rounding: of columns that are alike any solution is one.
         ridge = np.where(w > 0, 4.0 * np.finfo(float).eps * diagonal, 1.0)
         system = np.where(among, gram, 0.0) + ridge[..., None] * np.eye(w.shape[-1])
-        solvable = np.isfinite(system).all(axis=(-2, -1)) & np.isfinite(moment).all(axis=-1)
+        solvable = np.asarray(np.isfinite(system).all(axis=(-2, -1)) & np.isfinite(moment).all(axis=-1))
         system = np.where(solvable[..., None, None], system, np.eye(w.shape[-1]))
         solved = np.linalg.solve(system, np.where(w > 0, moment, 0.0)[..., None])[..., 0]
         better = np.isfinite(solved).all(axis=-1) & (solved >= 0).all(axis=-1)

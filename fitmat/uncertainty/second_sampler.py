@@ -135,8 +135,9 @@ def require() -> ModuleType:
     """The package blackjax; asked for before anything is fitted that it shall check.
 
     Raises:
-        FitmatError: it is missing; names the command that installs it.
+        FitmatError: it is missing, or what tells how far its chains can be trusted; names the command that installs it.
     """
+    needed("arviz_stats", "checking a posterior with NUTS")
     return needed("blackjax", "checking a posterior with NUTS")
 
 

@@ -428,6 +428,54 @@ def test_default_run_prints_one_object_and_nothing_else(environment, tmp_path):
     ]
 
 
+LOADED = """
+import atexit, sys, fitmat.cli.main
+heavy = "scipy.stats scipy.optimize colour arviz_stats corner matplotlib.pyplot optimistix xarray".split()
+atexit.register(lambda: print("LOADED", *(name for name in heavy if name in sys.modules), file=sys.stderr))
+sys.argv = ["fitmat", "fit", *sys.argv[1:]]
+fitmat.cli.main.main()
+"""
+
+
+def test_a_default_run_loads_nothing_that_it_does_not_need(environment, tmp_path):
+    """The second of two runs, which finds its programs; the page has two pictures and says how to get the others."""
+    for name in ("one", "two"):
+        command = [sys.executable, "-c", LOADED, str(DATA / "sparse.csv"), "--out", str(tmp_path / name)]
+        ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=PATIENCE)
+        assert ended.returncode in (0, 3), ended.stderr
+    assert "compiling" not in ended.stderr
+    assert ended.stderr.splitlines()[-1] == "LOADED"
+    page = (tmp_path / "two" / "report.html").read_text()
+    assert page.count("data:image/png") == 2
+    assert "fitmat fit --full" in page
+
+
+def test_the_folder_of_programs_is_shown_and_cleared(environment, tmp_path):
+    here = environment | {"FITMAT_CACHE": str(tmp_path / "programs")}
+    assert shell(here, "fit", DATA / "sparse.csv", *QUICK, "--out", tmp_path / "out").returncode in (0, 3)
+    kept = shell(here, "cache").stdout
+    assert re.fullmatch(r"\d+ compiled programs, [\d.]+ MB, are kept in .*programs\.\n", kept)
+    assert shell(here, "cache", "--clear").stdout == kept.replace("are kept", "were removed from the folder")
+    assert shell(here, "cache").stdout.startswith("0 compiled programs, 0.0 MB")
+    assert os.listdir(tmp_path / "programs") == []
+
+
+def test_a_folder_that_cannot_be_used_is_said_once(environment, tmp_path):
+    """The same numbers without it."""
+    (tmp_path / "file").write_text("")
+    results = []
+    for name, place in (("kept", environment["FITMAT_CACHE"]), ("not", str(tmp_path / "file"))):
+        ended = shell(
+            environment | {"FITMAT_CACHE": place}, "fit", DATA / "sparse.csv", *QUICK, "--out", tmp_path / name
+        )
+        assert ended.returncode in (0, 3)
+        results.append(((tmp_path / name / "fit.json").read_text(), beside_progress(ended.stderr)))
+    assert results[0][0] == results[1][0]
+    assert results[0][1] == ""
+    assert results[1][1].startswith("Compiled programs are not kept (")
+    assert results[1][1].count("\n") == 1
+
+
 def test_ctrl_c_while_fitting(environment, tmp_path):
     command = [sys.executable, "-m", "fitmat", "fit", str(DATA / "sparse.csv"), "--out", str(tmp_path / "out")]
     running = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

@@ -31,6 +31,9 @@ FEWER = 5e-3
 EDGE = 0.03
 """Relative; the edge of a region, or of Ngan's 80°, runs between the nodes over ω_o."""
 
+SPREAD = 0.05
+"""Widths of the interval; a hundred draws put its ends no nearer than 0.07."""
+
 FIRST, SECOND = 0.25 / np.pi, 0.2 / np.pi
 """The values of the two Lambert surfaces, in sr⁻¹."""
 
@@ -103,6 +106,20 @@ def test_draws_give_the_interval(grey: Distances) -> None:
     """Draws of 0.24 and 0.30 beside 0.2: distances 0.2 and 0.5, whose quantiles lie between."""
     assert grey.whole["relative"].ci95 == pytest.approx((0.2 + 0.025 * 0.3, 0.2 + 0.975 * 0.3))
     assert grey.by_incidence["relative"][[0, 2], 4] == pytest.approx([0.2075, 0.4925])
+
+
+def test_the_spread_of_draws_needs_fewer_nodes_than_the_best_fits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The ends of every interval, by the coarse rule and by the rule of the best fits, in widths of the interval."""
+    rng = np.random.default_rng(1)
+    one = [blinn(kd=0.2, ks=0.05 * u, exponent=40.0 * v) for u, v in np.exp(0.15 * rng.normal(size=(60, 2)))]
+    other = [facets(kd=0.2 * u, ks=v, alpha=0.2, eta=1.5) for u, v in np.exp(0.05 * rng.normal(size=(60, 2)))]
+    coarse = measured(one, other)
+    monkeypatch.setattr("fitmat.match.distances.COARSE", (64, 32))
+    fine = measured(one, other)
+    for name, exact in fine.whole.items():
+        near = coarse.whole[name]
+        assert near.value == pytest.approx(exact.value, rel=EXACT)
+        assert np.abs(np.subtract(near.ci95, exact.ci95)).max() < SPREAD * np.ptp(exact.ci95), name
 
 
 def test_shares_of_the_regions_are_those_of_their_light(grey: Distances) -> None:
