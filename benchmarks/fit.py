@@ -12,6 +12,7 @@ import itertools
 from collections.abc import Callable
 
 import jax
+import jax.numpy as jnp
 import machine
 import numpy as np
 import scipy.optimize
@@ -19,12 +20,12 @@ from peer import Problem, from_sine
 
 import fitmat as fm
 from fitmat.fitting.coordinates import coordinates
-from fitmat.fitting.fitting import descend
-from fitmat.fitting.likelihood import Data, first_discrepancy, prepare
-from fitmat.maths.least_squares import Minimum
+from fitmat.fitting.fitting import LITTLE_DAMPING, MANY_ROWS
+from fitmat.fitting.likelihood import Data, every_residual, first_discrepancy, prepare, transformed
+from fitmat.maths.least_squares import Minimum, Normal, least_squares, normal_equations
 from fitmat.measurements.noise import measured_noise
 from fitmat.measurements.samples import Measurements
-from fitmat.models.parameters import vector
+from fitmat.models.parameters import vector, with_vector
 
 TRUTH = {"kd": 0.3, "ks": 1.0, "alpha": 0.2, "eta": 1.5}
 START = {"kd": 0.45, "ks": 0.7, "alpha": 0.28, "eta": 1.9}
@@ -50,16 +51,42 @@ def problem(m: Measurements, *, hoisted: bool) -> Problem:
     return Problem(m.wi, m.wo, m.value[:, 0], m.sigma[:, 0], hoisted=hoisted)
 
 
-def ours(data: Data, s: jax.Array) -> tuple[Callable[[], Minimum], Callable[[Minimum], np.ndarray]]:
-    """One warm fit, to call; and its parameters."""
+def ours(data: Data, s: np.ndarray) -> tuple[Callable[[], Minimum], Callable[[Minimum], np.ndarray]]:
+    """One warm fit, to call; and its parameters. Of many rows first a part, as `fitmat.fit` does."""
     template = fm.model("lambert+ggx", channels=1, **START)
     moved, values = coordinates(template), vector(template)
-    solve = jax.jit(lambda u, data, s: descend((template, moved), data, values, u, s))
-    start = moved.unbounded(values)
-    return (
-        lambda: jax.block_until_ready(solve(start, data, s)),
-        lambda end: np.asarray(moved.from_unbounded(values, end.x)),
-    )
+
+    def residual(u: jax.Array, args: tuple) -> jax.Array:
+        return every_residual(with_vector(template, moved.from_unbounded(jnp.asarray(values), u)), *args)
+
+    def minimum(u: jax.Array, data: Data, s: jax.Array, damping: float) -> Minimum:
+        return least_squares(residual, u, (data, s, transformed(data, s)), damping=damping)
+
+    solve = jax.jit(minimum)
+    start, whole = moved.unbounded(values), jax.device_put(data)
+    rows = data.x.shape[0]
+    part = jax.device_put(data.every(-(-rows // (MANY_ROWS // 2))))
+
+    def run() -> Minimum:
+        if rows <= MANY_ROWS:
+            return jax.block_until_ready(solve(start, whole, s, 1.0))
+        return jax.block_until_ready(solve(solve(start, part, s, 1.0).x, whole, s, LITTLE_DAMPING))
+
+    return run, lambda end: np.asarray(moved.from_unbounded(values, np.asarray(end.x)))
+
+
+def one_pass(data: Data, s: np.ndarray) -> Callable[[], object]:
+    """Residuals, Jacobian and JᵀJ of all rows once, to call."""
+    template = fm.model("lambert+ggx", channels=1, **START)
+    moved, values = coordinates(template), vector(template)
+
+    def point(u: jax.Array, data: Data, s: jax.Array) -> Normal:
+        return normal_equations(
+            lambda u: every_residual(with_vector(template, moved.from_unbounded(jnp.asarray(values), u)), data, s), u
+        )
+
+    run, start, whole = jax.jit(point), moved.unbounded(values), jax.device_put(data)
+    return lambda: jax.block_until_ready(run(start, whole, s))
 
 
 def scipys(peer: Problem, s: float, start: np.ndarray) -> Callable[[], scipy.optimize.OptimizeResult]:
@@ -111,10 +138,11 @@ def race(rows: int, repeats: int, *, whole: bool) -> None:
     print("scipy lm    " + "  ".join(f"{v:.10g}" for v in found[1]))
     print(f"largest relative difference {difference:.1e}")
     assert difference < SAME, "the two fits do not agree: no race"
-    names = ("fitmat, one start", "scipy lm, one start", "scipy lm, geometry hoisted", "fitmat.fit, whole")
+    names = ("fitmat, one start", "scipy lm, one start", "scipy lm, geometry hoisted", "fitmat.fit, whole", "one pass")
     rivals: dict[str, Callable[[], object]] = {names[0]: one, names[1]: other, names[2]: hoisted}
     evaluations = f"{solution.nfev} steps, {solution.calls} evaluations"
     work = {names[0]: f"{int(end.steps)} iterations", names[1]: evaluations, names[2]: evaluations}
+    rivals[names[4]], work[names[4]] = one_pass(data, s), "residuals, Jacobian and JᵀJ of all rows"
     if whole:
         fitted = fm.fit(m, "lambert+ggx")
         rivals[names[3]] = lambda: fm.fit(m, "lambert+ggx")

@@ -108,9 +108,11 @@ def fit(
 
     with session.watch() as watch:
         process.set_up()
+        from fitmat.maths import programs
+
+        programs.load_ahead()
         from fitmat import files
         from fitmat.fitting import priors
-        from fitmat.maths import programs
         from fitmat.models.parameters import assignments
         from fitmat.reports import page, terminal
         from fitmat.studies.study import study
@@ -124,7 +126,6 @@ def fit(
         ):
             process.leave_on_interrupt(draft)
             measurements = session.source(file, reading | {"instrument": instrument}, watch)
-            process.load_beside("fitmat.reports.plot")
             found = study(
                 measurements,
                 models,
@@ -139,6 +140,7 @@ def fit(
             )
             watch("writing the report", 0, 0)
             page.write(draft, found)
+        programs.remember()
     if not no_mcmc:
         files.discard(files.resumed(target))
     if json_:

@@ -3,14 +3,12 @@
 It knows no command.
 """
 
-import importlib
 import io
 import logging
 import os
 import shutil
 import signal
 import sys
-import threading
 import warnings
 from pathlib import Path
 from types import FrameType
@@ -50,11 +48,6 @@ def set_up() -> None:
     import jax
 
     jax.config.update("jax_enable_x64", True)
-
-
-def load_beside(module: str) -> None:
-    """Load a module in a thread, while this one has other things to do."""
-    threading.Thread(target=importlib.import_module, args=(module,), daemon=True).start()
 
 
 def end(message: str) -> None:

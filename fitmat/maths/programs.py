@@ -11,12 +11,14 @@ import functools
 import hashlib
 import os
 import platform
+import re
 import stat
 import threading
 import types
 import warnings
 import zlib
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -34,6 +36,12 @@ FOLDER = "FITMAT_CACHE"
 
 LIMIT = 512 * 2**20
 """Bytes that the folder may hold; beyond, what was not used for longest is removed."""
+
+LAST = "last-run"
+"""File that names the programs of the last run."""
+
+MOST_AHEAD = 16
+"""Programs that are loaded ahead."""
 
 HASTE = {"xla_backend_optimization_level": 0}
 """Options of the compiler for programs that are run once."""
@@ -120,6 +128,11 @@ class Program:
         except _Unnamed:
             return self._jit(flat)
         name = f"{self._name}-{hashlib.sha256(words.encode()).hexdigest()[:24]}"
+        _USED.append(name)
+        early = _AHEAD.pop(name, None)
+        run = None if early is None else early.result()
+        if run is not None:
+            return run
         exported = _read(name)
         if exported is None:
             _tell(given)
@@ -142,6 +155,10 @@ class Program:
 _EVERY: list[Program] = []
 
 _TOLD: list[Callable[[str], None]] = []
+
+_USED: list[str] = []
+
+_AHEAD: dict[str, "Future[Callable[..., Any] | None]"] = {}
 
 
 @contextlib.contextmanager
@@ -335,6 +352,47 @@ def _write(name: str, exported: Any) -> None:
     except OSError:
         with contextlib.suppress(OSError):
             draft.unlink()
+
+
+def load_ahead() -> None:
+    """Load, in a thread, what the last run used, while this one has other things to do; `remember` ends a run."""
+    place = folder()
+    if place is None:
+        return
+    try:
+        names = (place / LAST).read_text(encoding="ascii", errors="replace").split()
+    except OSError:
+        return
+    known = [name for name in names[:MOST_AHEAD] if re.fullmatch(r"\w+-[0-9a-f]{24}", name)]
+    pool = ThreadPoolExecutor(1)
+    _AHEAD.update({name: pool.submit(_loaded, name) for name in known})
+    pool.shutdown(wait=False)
+
+
+def _loaded(name: str) -> Callable[..., Any] | None:
+    """A program of the folder, ready to run; None where there is none."""
+    exported = _read(name)
+    if exported is None:
+        return None
+
+    def call(*found: Any) -> Any:
+        return exported.call(*found)
+
+    call.__name__ = name
+    shapes = [jax.ShapeDtypeStruct(given.shape, given.dtype) for given in exported.in_avals]
+    with contextlib.suppress(Exception):
+        return jax.jit(call).lower(*shapes).compile()
+    return None
+
+
+def remember() -> None:
+    """Note which programs this run used, for `load_ahead` of the next."""
+    place = folder()
+    if place is not None and _USED:
+        draft = place / f".{LAST}.{os.getpid()}"
+        with contextlib.suppress(OSError):
+            draft.write_text("\n".join(dict.fromkeys(_USED)), encoding="ascii")
+            os.replace(draft, place / LAST)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -4,6 +4,7 @@ It computes nothing and writes to stdout only.
 """
 
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -16,29 +17,40 @@ from fitmat.studies.study import MOST_SAMPLED, Study
 from fitmat.uncertainty.posterior import Posterior
 
 
-def show(found: Study, folder: Path) -> None:
-    """Print the parameters of every model, what speaks against them, the verdict and where the report is."""
-    out = Console()
+def _say(out: Console, words: str, **how: Any) -> None:
+    """Print words, wrapped at the edge of a terminal, and not at all where there is none."""
+    out.print(words, highlight=False, soft_wrap=not out.is_terminal or out.is_dumb_terminal, **how)
+
+
+def show(found: Study, folder: Path, screen: Console | None = None) -> None:
+    """Print the parameters of every model, what speaks against them, the verdict and where the report is.
+
+    Args:
+        found: What to show.
+        folder: Where the report is.
+        screen: Where to; stdout if None.
+    """
+    out = screen or Console()
     first = found.findings[0].fit
-    out.print(str(first.measurements), markup=False, highlight=False)
-    out.print(first.noise.words, markup=False, highlight=False)
+    _say(out, str(first.measurements), markup=False)
+    _say(out, first.noise.words, markup=False)
     if first.n_values > MOST_SAMPLED:
         words = f"More than {MOST_SAMPLED:,} values: intervals from Laplace's approximation, nothing is sampled."
-        out.print(words, highlight=False)
+        _say(out, words)
     if not first.loss.posterior:
-        out.print(f"The loss {first.loss.name} is an objective: single fits, without a posterior.", highlight=False)
+        _say(out, f"The loss {first.loss.name} is an objective: single fits, without a posterior.")
     shown = found.detailed
     for one in shown:
-        out.print(f"\n[bold]{_title(one.posterior)}[/bold]", highlight=False)
+        _say(out, f"\n[bold]{_title(one.posterior)}[/bold]")
         out.print(_table(one))
         _remark(out, one)
-    out.print("\n→ follows from the parameters above it", highlight=False, style="dim")
+    _say(out, "\n→ follows from the parameters above it", style="dim")
     if len(shown) < len(found.findings):
-        out.print(f"{len(found.findings) - len(shown)} more models: see the report.", highlight=False, style="dim")
+        _say(out, f"{len(found.findings) - len(shown)} more models: see the report.", style="dim")
     verdicts = [] if found.choice is None or len(found.findings) == len(shown) else [found.choice.verdict]
     adequate = " ".join(f"{one.name} {one.fit.adequacy}." for one in found.findings)
     for words in (*verdicts, found.match.verdict if found.match else adequate):
-        out.print(f"\n[bold]{words}[/bold]", highlight=False)
+        _say(out, f"\n[bold]{words}[/bold]")
     out.print(f"\nReport: {folder / 'report.html'}", markup=False, highlight=False, soft_wrap=True)
 
 
@@ -47,14 +59,14 @@ def _remark(out: Console, found: Findings) -> None:
     result, against = found.fit.result, found.doubts
     if result != "converged":
         words = f"[yellow]{result}[/yellow]: {RESULTS[result]}"
-        out.print(words, highlight=False)
+        _say(out, words)
     if found.posterior.interrupted:
-        out.print("[yellow]interrupted[/yellow]: sampling was stopped; what was done is kept.", highlight=False)
+        _say(out, "[yellow]interrupted[/yellow]: sampling was stopped; what was done is kept.")
     if against.words:
-        out.print(f"[yellow]{'inadequate' if against.inadequate else 'note'}[/yellow]: {against}", highlight=False)
+        _say(out, f"[yellow]{'inadequate' if against.inadequate else 'note'}[/yellow]: {against}")
     for said in (found.identifiability, found.second_opinion):
         if said is not None:
-            out.print(said.words, markup=False, highlight=False)
+            _say(out, said.words, markup=False)
 
 
 def _title(posterior: Posterior) -> str:

@@ -455,7 +455,7 @@ def test_the_folder_of_programs_is_shown_and_cleared(environment, tmp_path):
     assert shell(here, "fit", DATA / "sparse.csv", *QUICK, "--out", tmp_path / "out").returncode in (0, 3)
     kept = shell(here, "cache").stdout
     assert re.fullmatch(r"\d+ compiled programs, [\d.]+ MB, are kept in .*programs\.\n", kept)
-    assert shell(here, "cache", "--clear").stdout == kept.replace("are kept", "were removed from the folder")
+    assert shell(here, "cache", "--clear").stdout == kept.replace("are kept in", "were removed from the folder")
     assert shell(here, "cache").stdout.startswith("0 compiled programs, 0.0 MB")
     assert os.listdir(tmp_path / "programs") == []
 

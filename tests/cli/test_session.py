@@ -30,9 +30,11 @@ def narrow(monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
 
 
-def test_show_fits_80_columns(posterior, capsys, tmp_path):
-    terminal.show(Study((find(posterior, ()),)), tmp_path)
-    out = capsys.readouterr().out
+def test_show_fits_80_columns(posterior, tmp_path):
+    written = io.StringIO()
+    screen = Console(file=written, width=80, force_terminal=True, color_system=None)
+    terminal.show(Study((find(posterior, ()),)), tmp_path, screen)
+    out = written.getvalue()
     lines = out.splitlines()
     assert max(map(len, (line for line in lines if str(tmp_path) not in line))) <= 80
     assert "…" not in out
@@ -40,6 +42,15 @@ def test_show_fits_80_columns(posterior, capsys, tmp_path):
     assert "lambert+ggx: converged, " in out
     for name in ("kd r", "kd g", "ks b", "alpha", "eta", "discrepancy", "→ f0", "→ roughness"):
         assert any(line.startswith(name) for line in lines)
+
+
+def test_nothing_is_wrapped_where_there_is_no_terminal(posterior, capsys, tmp_path):
+    """Sentences stay whole for whoever searches them, however narrow the window."""
+    found = find(posterior, ())
+    terminal.show(Study((found,)), tmp_path)
+    lines = capsys.readouterr().out.splitlines()
+    assert str(found.fit.measurements).splitlines()[-1] in lines
+    assert found.fit.noise.words in lines
 
 
 def test_show_names_the_outcome(posterior, capsys, tmp_path):
@@ -98,9 +109,9 @@ def test_a_run_that_goes_on_says_so(monkeypatch):
 def test_a_line_a_stage_where_nobody_watches():
     """A pipe, and a terminal that cannot move its cursor: nothing is wrapped, nothing is said twice."""
     name = "lambert+" + "a-very-long-name-" * 8
-    for given in ({"force_terminal": False}, {"force_terminal": True, "_environ": {"TERM": "dumb"}}):
+    for moves, kind in ((False, "xterm"), (True, "dumb")):
         written = io.StringIO()
-        told = session.Watch(Console(file=written, width=40, **given))
+        told = session.Watch(Console(file=written, width=40, force_terminal=moves, _environ={"TERM": kind}))
         told.open("loading")
         for done in range(3):
             told(f"fitting {name}", done, 3)
