@@ -20,8 +20,8 @@ from fitmat.judgement.calibration import (
     Calibration,
     coverage_limits,
     join,
-    rejected,
 )
+from fitmat.judgement.multiplicity import adjusted_for_many
 from fitmat.judgement.uniformity import band
 
 BAND = 0.95
@@ -135,7 +135,7 @@ def _rejected(groups: Mapping[tuple, Calibration]) -> list[tuple[str, ...]]:
     """Names of the group and the quantity of every test that falls, all groups being one family."""
     names = [(*map(str, group), quantity) for group, result in groups.items() for quantity in result.quantities]
     p = np.concatenate([result.p_values() for result in groups.values()])
-    return [names[k] for k in rejected(p, FAMILY)]
+    return [names[k] for k in np.flatnonzero(adjusted_for_many(np.asarray(p)) < FAMILY)]
 
 
 def _verdict(wrong: Sequence[tuple[str, ...]]) -> str:
