@@ -121,10 +121,9 @@ def fit(
         told = {"loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
         target = out or files.default(file)
         with (
-            files.new(target, force=force, stale=page.POSTERIOR.format("*")) as draft,
+            process.taken_away(files.new(target, force=force, stale=page.POSTERIOR.format("*"))) as draft,
             programs.announced(watch.compiling),
         ):
-            process.leave_on_interrupt(draft)
             measurements = session.source(file, reading | {"instrument": instrument}, watch)
             found = study(
                 measurements,

@@ -3,6 +3,7 @@
 It knows no command.
 """
 
+import contextlib
 import io
 import logging
 import os
@@ -10,6 +11,7 @@ import shutil
 import signal
 import sys
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
 
@@ -41,6 +43,21 @@ def leave_on_interrupt(draft: Path | None = None) -> None:
         os._exit(INTERRUPTED)
 
     signal.signal(signal.SIGINT, leave)
+
+
+@contextlib.contextmanager
+def taken_away(new: contextlib.AbstractContextManager[Path]) -> Iterator[Path]:
+    """A draft that Ctrl-C takes away, also where it comes while the draft is made."""
+    asked: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _: asked.append(number))
+    try:
+        with new as draft:
+            leave_on_interrupt(draft)
+            if asked:
+                signal.raise_signal(signal.SIGINT)
+            yield draft
+    finally:
+        leave_on_interrupt()
 
 
 def set_up() -> None:
