@@ -30,3 +30,6 @@ Samples = Float[Array, "n c"]
 
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, how much of it is done, and how much is expected (0 while nobody knows)."""
+
+SAMPLING = "sampling"
+"""How what is being done begins where an interrupt keeps what was done."""

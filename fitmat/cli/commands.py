@@ -146,8 +146,8 @@ def fit(
         sys.stdout.write((target / "fit.json").read_text(encoding="utf-8"))
     else:
         terminal.show(found, target)
-    if programs.folder() is None and (why := programs.kept()).why:
-        typer.echo(why.words, err=True)
+    if (kept := programs.kept()).why:
+        typer.echo(kept.words, err=True)
     if any(p.fit.result != "converged" or p.interrupted for p in found.posteriors):
         raise typer.Exit(NOT_CONVERGED)
 
@@ -313,5 +313,9 @@ def cache(
     """Say where compiled programs are kept and how many there are; they spare each run the compiling of the first."""
     from fitmat.maths import programs
 
-    found = programs.remove() if clear else programs.kept()
-    typer.echo(found.words.replace("are kept in", "were removed from the folder") if clear else found.words)
+    found = programs.kept()
+    if clear and found.folder is not None:
+        programs.remove()
+        typer.echo(f"{found.amount}, were removed from the folder {found.folder}.")
+    else:
+        typer.echo(found.words)

@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from fitmat._types import SAMPLING
+
 if TYPE_CHECKING:
     from fitmat.measurements.large.stream import Stream
     from fitmat.measurements.samples import Measurements
-
-SAMPLING = "sampling"
-"""How the stages begin in which an interrupt keeps what was done."""
 
 
 class Watch:

@@ -20,7 +20,6 @@ from fitmat.fitting.likelihood import (
     every_residual,
     first_discrepancy,
     log_density,
-    mapped,
     predicted,
     prepare,
     transformed,
@@ -31,6 +30,7 @@ from fitmat.fitting.priors import prepare_prior
 from fitmat.fitting.result import Ends, Fit, conclude
 from fitmat.fitting.starts import starting_points
 from fitmat.maths.least_squares import least_squares
+from fitmat.maths.mapping import mapped
 from fitmat.maths.programs import program
 from fitmat.measurements.noise import measured_noise
 from fitmat.measurements.samples import Measurements

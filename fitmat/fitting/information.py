@@ -8,8 +8,9 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from fitmat.fitting.coordinates import Coordinates, coordinates
-from fitmat.fitting.likelihood import Data, every_residual, mapped, misfits
+from fitmat.fitting.likelihood import Data, every_residual, misfits
 from fitmat.maths.least_squares import normal_equations
+from fitmat.maths.mapping import mapped
 from fitmat.maths.programs import program
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import entries, vector
@@ -40,7 +41,7 @@ def normal_equations_at(
         points: Natural coordinates.
         s: Discrepancy.
     """
-    every, size, found = coordinates(template), 0, []
+    every, found = coordinates(template), []
     for part in slices(len(points), AT_ONCE):
         size = part.stop - part.start
         filled = np.concatenate([points[part], np.repeat(points[part][:1], AT_ONCE - size, axis=0)])

@@ -14,6 +14,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.likelihood import Data, log_likelihood, prepare, residuals
+from fitmat.maths.least_squares import normal_equations
 from fitmat.maths.programs import program
 from fitmat.measurements.noise import Noise
 from fitmat.measurements.samples import Measurements
@@ -56,11 +57,8 @@ def _block_sums(best: AbstractBRDF, data: Data, s: ArrayLike) -> tuple[Array, ..
     at = every.natural(values)
 
     def by_parameter(s: Array) -> tuple[Array, Array]:
-        def residual(t: Array) -> Array:
-            return residuals(every.model(best, values, t), data, s).ravel()
-
-        r, columns = jax.vmap(lambda e: jax.jvp(residual, (at,), (e,)), out_axes=(None, 0))(jnp.eye(len(at)))
-        return columns @ r, columns @ columns.T
+        found = normal_equations(lambda t: residuals(every.model(best, values, t), data, s), at)
+        return found.slope, found.gram
 
     def slope(s: Array) -> tuple[Array, Array]:
         cost, change = jax.value_and_grad(lambda s: -log_likelihood(best, data, s))(s)

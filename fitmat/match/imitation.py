@@ -17,14 +17,13 @@ from jaxtyping import Array, ArrayLike, Float
 from fitmat.errors import FitmatError
 from fitmat.fitting.coordinates import Coordinates, coordinates
 from fitmat.fitting.fitting import STEADY
-from fitmat.fitting.likelihood import mapped
 from fitmat.fitting.result import Fit
 from fitmat.fitting.starts import nonnegative
-from fitmat.match.distances import AZIMUTHS, direction_weight, incidence_weight
+from fitmat.match.distances import direction_weight, incidence_weight, lobe_rules
 from fitmat.match.regions import incidence_panels
 from fitmat.maths.least_squares import least_squares
+from fitmat.maths.mapping import mapped
 from fitmat.maths.programs import program
-from fitmat.maths.quadrature import lobe_rule
 from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.conversion import exponent_from_alpha
@@ -231,11 +230,11 @@ def _rows(source: AbstractBRDF, metric: str) -> Target:
     """The quadrature, dense where the imitated lobe is."""
     theta, solid = incidence_panels()
     width = float(widths(source, vector(source)[None])[0])
-    turns = [None] if source.isotropic else ((np.arange(AZIMUTHS) + 0.5) * np.pi / AZIMUTHS).tolist()
-    rules = [lobe_rule(angle, width, phi_i=turn, nodes=NODES) for turn in turns for angle in theta]
+    rules = lobe_rules(theta, width, isotropic=source.isotropic, nodes=NODES)
     wi = np.concatenate([np.broadcast_to(rule.wi, rule.wo.shape) for rule in rules])
     wo = np.concatenate([rule.wo for rule in rules])
-    f, of_light = at(source, wi, wo), np.tile(incidence_weight(METRICS[metric], theta, solid), len(turns))
+    f = at(source, wi, wo)
+    of_light = np.repeat(incidence_weight(METRICS[metric], theta, solid), len(rules) // len(theta))
     of_sensor = [direction_weight(METRICS[metric], rule) for rule in rules]
     weight = np.concatenate([light * part for light, part in zip(of_light, of_sensor, strict=True)])
     norm = weight @ ((f**2).mean(axis=1) if METRICS[metric].kind == "relative" else np.ones(len(f)))

@@ -25,10 +25,6 @@ class Normal(NamedTuple):
     slope: Float[Array, " p"]
     gram: Float[Array, "p p"]
 
-    def __add__(self, other: "Normal") -> "Normal":  # type: ignore[override]
-        """Of both sets of residuals together."""
-        return Normal(self.square + other.square, self.slope + other.slope, self.gram + other.gram)
-
 
 class Minimum(eqx.Module):
     """Where a solve ended.

@@ -142,11 +142,7 @@ class Program:
                 return self._jit(flat)
             _write(name, exported)
 
-        def call(*found: Any) -> Any:
-            return exported.call(*found)
-
-        call.__name__ = name
-        return self._jit(call)
+        return self._jit(_calling(exported, name))
 
     def _jit(self, function: Callable[..., Any]) -> Callable[..., Any]:
         return jax.jit(function, compiler_options=self._options)
@@ -207,6 +203,16 @@ def _exported(flat: Callable[..., Any], arrays: list[Any]) -> Any:
         return export.export(jax.jit(flat), disabled_checks=checks)(*shapes)
     except (NotImplementedError, ValueError):
         return None
+
+
+def _calling(exported: Any, name: str) -> Callable[..., Any]:
+    """A call of what was exported, under the name by which XLA keeps it."""
+
+    def call(*found: Any) -> Any:
+        return exported.call(*found)
+
+    call.__name__ = name
+    return call
 
 
 class _Unnamed(Exception):
@@ -375,13 +381,9 @@ def _loaded(name: str) -> Callable[..., Any] | None:
     if exported is None:
         return None
 
-    def call(*found: Any) -> Any:
-        return exported.call(*found)
-
-    call.__name__ = name
     shapes = [jax.ShapeDtypeStruct(given.shape, given.dtype) for given in exported.in_avals]
     with contextlib.suppress(Exception):
-        return jax.jit(call).lower(*shapes).compile()
+        return jax.jit(_calling(exported, name)).lower(*shapes).compile()
     return None
 
 
@@ -412,11 +414,16 @@ class Kept:
     size: int
 
     @property
+    def amount(self) -> str:
+        """How many, and how much."""
+        return f"{self.programs} compiled programs, {self.size / 1e6:.1f} MB"
+
+    @property
     def words(self) -> str:
         """One sentence."""
         if self.folder is None:
             return f"Compiled programs are not kept{f' ({self.why})' if self.why else ''}: each run compiles anew."
-        return f"{self.programs} compiled programs, {self.size / 1e6:.1f} MB, are kept in {self.folder}."
+        return f"{self.amount}, are kept in {self.folder}."
 
 
 def kept() -> Kept:

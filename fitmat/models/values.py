@@ -5,14 +5,13 @@ It knows no measurement and no draw's meaning; what is done with the values is N
 
 import itertools
 from collections.abc import Iterator, Sequence
-from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from fitmat._types import Samples
+from fitmat.maths.mapping import mapped
 from fitmat.maths.programs import program
 from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
@@ -124,19 +123,11 @@ def _filled(part: np.ndarray, count: int) -> np.ndarray:
 def _block(
     template: AbstractBRDF, draws: ArrayLike, wi: ArrayLike, wo: ArrayLike, count: ArrayLike
 ) -> tuple[Float[Array, "D N c"], Float[Array, " D"]]:
-    """Values and widths of the first `count` draws; on a CPU one after the other: each pass stays in its cache."""
+    """Values and widths of the first `count` draws."""
     every, light, sensor = (jnp.asarray(part) for part in (draws, wi, wo))
 
     def one(draw: Array) -> tuple[Samples, Array]:
         model = with_vector(template, draw)
         return evaluate_pairs(model, light, sensor), model.width()
 
-    if jax.default_backend() != "cpu":
-        return jax.vmap(one)(every)
-
-    def step(k: Array, found: Any) -> Any:
-        return jax.tree.map(lambda whole, part: whole.at[k].set(part), found, one(every[k]))
-
-    shapes = jax.eval_shape(one, every[0])
-    empty = jax.tree.map(lambda part: jnp.zeros((len(every), *part.shape)), shapes)
-    return jax.lax.fori_loop(0, count, step, empty)
+    return mapped(one, every, count)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import ArrayLike
 
-from fitmat._types import Progress
+from fitmat._types import SAMPLING, Progress
 from fitmat.errors import ModelError
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.streamed import fit_chunks, rows
@@ -37,9 +37,6 @@ MOST_SAMPLED = 50_000
 
 DETAILED = 4
 """Of more models than this, only so many are examined one by one: those of the match, then the best."""
-
-SAMPLING = "sampling"
-"""How the stages begin in which an interrupt keeps what was done."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

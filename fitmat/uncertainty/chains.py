@@ -14,7 +14,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from fitmat._types import Progress
+from fitmat._types import SAMPLING, Progress
 from fitmat.errors import FitmatError, OutputError
 from fitmat.fitting.result import Fit
 from fitmat.uncertainty.checkpoint import Checkpoint, Saved, digest
@@ -84,7 +84,7 @@ def sample(
             if kept is not None:
                 kept.write(sampler.backend, goal, finished=sampler.iteration >= min(goal, max_steps))
             if progress is not None:
-                progress(f"sampling {fit.name}", sampler.iteration, min(max(goal, sampler.iteration), max_steps))
+                progress(f"{SAMPLING} {fit.name}", sampler.iteration, min(max(goal, sampler.iteration), max_steps))
     except KeyboardInterrupt:
         interrupted = True
     if sampler.iteration < 4:
@@ -120,14 +120,11 @@ def _emcee() -> Any:
     if "emcee" not in sys.modules and "scipy.stats" not in sys.modules:
         later = types.ModuleType("scipy.stats")
         later.__dict__["gaussian_kde"] = lambda *args: importlib.import_module("scipy.stats").gaussian_kde(*args)
-        scipy = types.ModuleType("scipy") if "scipy" not in sys.modules else None
-        stand_ins = {"scipy.stats": later} | ({} if scipy is None else {"scipy": scipy})
-        sys.modules.update(stand_ins)
+        sys.modules["scipy.stats"] = later
         try:
             return importlib.import_module("emcee")
         finally:
-            for name in stand_ins:
-                del sys.modules[name]
+            del sys.modules["scipy.stats"]
     return importlib.import_module("emcee")
 
 

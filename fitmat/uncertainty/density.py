@@ -12,8 +12,9 @@ import numpy as np
 from jaxtyping import Array, ArrayLike
 
 from fitmat.fitting.coordinates import Coordinates
-from fitmat.fitting.likelihood import Data, log_density, mapped
+from fitmat.fitting.likelihood import Data, log_density
 from fitmat.fitting.result import Fit
+from fitmat.maths.mapping import mapped
 from fitmat.maths.programs import program
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector

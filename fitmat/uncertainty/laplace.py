@@ -95,14 +95,15 @@ def laplace_each(
 
     words = f"fitting {', '.join(jobs) if len(jobs) <= NAMED else f'{len(jobs)} models'}"
     say = progress or (lambda *_: None)
-    say(words, 0, len(jobs) if len(jobs) > NAMED else 0)
+    total = len(jobs) if len(jobs) > NAMED else 0
+    say(words, 0, total)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         pending = [pool.submit(one, name) for name in jobs]
         for done, job in enumerate(as_completed(pending), 1):
             if job.exception() is not None:
                 pool.shutdown(cancel_futures=True)
                 break
-            say(words, done if len(jobs) > NAMED else 0, len(jobs) if len(jobs) > NAMED else 0)
+            say(words, min(done, total), total)
         return [job.result() for job in pending if not job.cancelled()]
 
 

@@ -17,8 +17,9 @@ from jaxtyping import Array, Float
 from fitmat.errors import FitmatError
 from fitmat.extras import needed
 from fitmat.fitting.coordinates import Coordinates
-from fitmat.fitting.likelihood import Data, mapped
+from fitmat.fitting.likelihood import Data
 from fitmat.fitting.result import Fit
+from fitmat.maths.mapping import mapped
 from fitmat.models.base import AbstractBRDF
 from fitmat.text import html_table, text_table
 from fitmat.uncertainty.density import log_density_at, physical

@@ -12,11 +12,11 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat.fitting.coordinates import Coordinates
-from fitmat.fitting.likelihood import mapped
 from fitmat.fitting.losses import Loss
 from fitmat.fitting.result import Fit
 from fitmat.judgement.identifiability.profiles import profiles
 from fitmat.judgement.identifiability.ridge import Ridge, ridge
+from fitmat.maths.mapping import mapped
 from fitmat.maths.programs import program
 from fitmat.models.base import AbstractBRDF
 
