@@ -108,7 +108,7 @@ def fit(
 
     with session.watch() as watch:
         process.set_up()
-        from fitmat.maths import programs
+        from fitmat.maths import program_files, programs
 
         programs.load_ahead()
         from fitmat import files
@@ -146,7 +146,7 @@ def fit(
         sys.stdout.write((target / "fit.json").read_text(encoding="utf-8"))
     else:
         terminal.show(found, target)
-    if (kept := programs.kept()).why:
+    if (kept := program_files.kept()).why:
         typer.echo(kept.words, err=True)
     if any(p.fit.result != "converged" or p.interrupted for p in found.posteriors):
         raise typer.Exit(NOT_CONVERGED)
@@ -311,11 +311,11 @@ def cache(
     clear: ClearFlag = False,
 ) -> None:
     """Say where compiled programs are kept and how many there are; they spare each run the compiling of the first."""
-    from fitmat.maths import programs
+    from fitmat.maths import program_files
 
-    found = programs.kept()
+    found = program_files.kept()
     if clear and found.folder is not None:
-        programs.remove()
+        program_files.remove()
         typer.echo(f"{found.amount}, were removed from the folder {found.folder}.")
     else:
         typer.echo(found.words)

@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fitmat.fitting.losses import LOSSES
+from fitmat.maths.programs import hasty
 from fitmat.models import laws
 from fitmat.models.registry import LOBES, lobe_names, model
 
@@ -111,7 +112,7 @@ def check(*, seed: int = 0, only: Callable[[str], bool] = lambda name: True) -> 
     """
     table, surprises = _table("lobe", *laws.LAWS), []
     names = [name for name in LOBES if only(name)]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with hasty(), ThreadPoolExecutor(os.cpu_count()) as pool:
         every = pool.map(lambda name: laws.check(model(laws.example(name)), seed=seed), names)
         checked = zip(names, every, strict=True)
         measured = list(track(checked, "checking", len(names), console=Console(stderr=True), transient=True))

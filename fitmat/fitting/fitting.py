@@ -249,28 +249,27 @@ def refine(
         return with_vector(template, moved.from_unbounded(base, u))
 
     def one(base: Array) -> tuple[Array, ...]:
-        def residual(u: Array, args: tuple[Array, Array]) -> Array:
-            s, measured = args
-            return every_residual(at(base, u), data, s, measured)
+        def residual(u: Array, args: tuple[Array, Array]) -> tuple[Array, Array]:
+            model = at(base, u)
+            x = predicted(model, data)
+            return every_residual(model, data, *args, x), x
 
         def body(state: _Stand) -> _Stand:
             s = state.discrepancy
             left = jnp.minimum(BURST, max_steps - state.steps)
             args = (s, transformed(data, s))
             end = least_squares(residual, state.u, args, max_steps=left, damping=state.damping)
-            best = at(base, end.x)
-            x = predicted(best, data)
-            updated = best_discrepancy(x, data, s)
+            updated = best_discrepancy(end.beside, data, s)
             settled = jnp.abs(updated - s) <= SETTLED * s
             ended, steady = settled & end.solved, settled & (end.offset < STEADY)
-            value = log_density(best, data, updated, x)
-            return _Stand(end.x, updated, end.damping, value, ended, steady, state.steps + end.steps)
+            return _Stand(end.x, updated, end.damping, end.beside, ended, steady, state.steps + end.steps)
 
         begin, no = first if data.loss.infers_discrepancy else 0.0 * first, jnp.array(False)
-        start = _Stand(moved.unbounded(base), begin, damping, jnp.zeros(()), no, no, jnp.array(0))
+        start = _Stand(moved.unbounded(base), begin, damping, jnp.zeros_like(data.x), no, no, jnp.array(0))
         end = jax.lax.while_loop(lambda state: ~state.ended & (state.steps < max_steps), body, start)
         best = moved.from_unbounded(base, end.u)
-        return best, end.discrepancy, end.log_density, end.ended | end.steady, end.steps
+        value = log_density(at(base, end.u), data, end.discrepancy, end.x)
+        return best, end.discrepancy, value, end.ended | end.steady, end.steps
 
     return mapped(one, jnp.asarray(starts), count)
 
@@ -281,7 +280,7 @@ class _Stand(NamedTuple):
     u: Array
     discrepancy: Array
     damping: Array
-    log_density: Array
+    x: Array
     ended: Array
     steady: Array
     steps: Array

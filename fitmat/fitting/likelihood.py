@@ -179,7 +179,9 @@ def prior_residuals(model: AbstractBRDF, data: Data) -> Float[Array, " p"]:
     return data.prior.precision * (coordinates(model).natural(vector(model)) - data.prior.mean)
 
 
-def every_residual(model: AbstractBRDF, data: Data, s: Scalar, measured: Samples | None = None) -> Float[Array, " r"]:
+def every_residual(
+    model: AbstractBRDF, data: Data, s: Scalar, measured: Samples | None = None, x: Samples | None = None
+) -> Float[Array, " r"]:
     """`residuals`, what an inferred noise adds, and `prior_residuals` as one vector, what least squares minimises.
 
     Args:
@@ -187,9 +189,10 @@ def every_residual(model: AbstractBRDF, data: Data, s: Scalar, measured: Samples
         data: The samples.
         s: Discrepancy.
         measured: T(y κ), for loops in which s stays.
+        x: `predicted`, where it is at hand.
     """
     measured = transformed(data, s) if measured is None else measured
-    samples = residuals_from(measured, model, data, s).ravel()
+    samples = residuals_from(measured, model, data, s, x).ravel()
     beside = [_spread_residuals(model, data).ravel()] if data.loss.infers_noise else []
     known = [] if data.prior is None else [prior_residuals(model, data)]
     return jnp.concatenate([samples, *beside, *known]) if beside or known else samples

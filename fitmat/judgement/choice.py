@@ -5,7 +5,9 @@ best of them is good enough is for `predictive_check` to say.
 """
 
 import dataclasses
+import os
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -217,15 +219,17 @@ def choose(posteriors: Sequence[Posterior], *, predicting: bool = True, singly: 
         raise FitmatError(
             f"the loss {first.loss.name} is no likelihood, so that it weighs no models; try --loss default."
         )
-    found = [weigh(p) if singly else None for p in usable]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        weighed = pool.map(lambda p: weigh(p) if singly else None, usable)
+        left = pool.map(lambda p: leave_incidences_out(p.fit) if predicting else None, usable)
+        found, unseen = list(weighed), list(left)
     scores = [-0.5 * p.fit.aicc if e is None else e.elpd for p, e in zip(usable, found, strict=True)]
     best = int(np.argmax(scores))
     candidates = []
-    for posterior, proof, score in zip(usable, found, scores, strict=True):
+    for posterior, proof, out, score in zip(usable, found, unseen, scores, strict=True):
         fit, top = posterior.fit, found[best]
         apart = np.zeros(1) if proof is None or top is None else top.pointwise - proof.pointwise
         error = float(np.sqrt(len(apart)) * apart.std())
-        left = leave_incidences_out(fit) if predicting else None
         against = broken_laws(fit), doubts(fit)
-        candidates.append(Candidate(posterior, proof, scores[best] - score, error, left, *against))
+        candidates.append(Candidate(posterior, proof, scores[best] - score, error, out, *against))
     return Choice(tuple(sorted(candidates, key=lambda c: c.behind)))

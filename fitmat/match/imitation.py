@@ -215,9 +215,9 @@ def _solve(
 
     target = transformed(rows.value)
 
-    def residual(u: Array, base: Array) -> Array:
+    def residual(u: Array, base: Array) -> tuple[Array, None]:
         f = evaluate_pairs(with_vector(template, moved.from_unbounded(base, u)), rows.wi, rows.wo)
-        return rows.root * (transformed(f) - target)
+        return rows.root * (transformed(f) - target), None
 
     def refined(base: Array) -> tuple[Array, Array, Array]:
         end = least_squares(residual, moved.unbounded(base), base)

@@ -36,6 +36,7 @@ class Minimum(eqx.Module):
         steps: Iterations used.
         damping: λ at the end, relative to the diagonal of JᵀJ at the start; to go on from here.
         offset: Relative offset of Bates & Watts (1981): the next Gauss–Newton step in units of the standard errors.
+        beside: What the residuals came with there.
     """
 
     x: Float[Array, " p"]
@@ -44,20 +45,29 @@ class Minimum(eqx.Module):
     steps: Int[Array, ""]
     damping: Float[Array, ""]
     offset: Float[Array, ""]
+    beside: Any = None
 
 
 def normal_equations(residual: Callable[[Float[Array, " p"]], Array], x: Float[Array, " p"]) -> Normal:
     """Of the residuals of any shape at x."""
+    return _seen(lambda at: (residual(at), None), x)[0]
 
-    def flat(at: Array) -> Array:
-        return jnp.ravel(residual(at))
 
-    r, columns = jax.vmap(lambda e: jax.jvp(flat, (x,), (e,)), out_axes=(None, 0))(jnp.eye(len(x)))
-    return Normal(r @ r, columns @ r, columns @ columns.T)
+def _seen(
+    residual: Callable[[Float[Array, " p"]], tuple[Array, Any]], x: Float[Array, " p"]
+) -> tuple[Normal, Any, float]:
+    """The normal equations at x, what the residuals come with, and how many they are."""
+
+    def along(e: Array) -> tuple[Array, Array, Any]:
+        r, column, beside = jax.jvp(residual, (x,), (e,), has_aux=True)
+        return r.ravel(), column.ravel(), beside
+
+    r, columns, beside = jax.vmap(along, out_axes=(None, 0, None))(jnp.eye(len(x)))
+    return Normal(r @ r, columns @ r, columns @ columns.T), beside, float(r.size)
 
 
 def least_squares(
-    residual: Callable[[Float[Array, " p"], Any], Array],
+    residual: Callable[[Float[Array, " p"], Any], tuple[Array, Any]],
     x0: Float[Array, " p"],
     args: Any = None,
     *,
@@ -68,7 +78,7 @@ def least_squares(
     """Minimise ½Σ residual² from x0.
 
     Args:
-        residual: `residual(x, args)`, any shape.
+        residual: `residual(x, args)`, any shape, and arrays that come with it, or None.
         x0: Start, (p,).
         args: Passed on.
         tolerance: Both the relative and the absolute tolerance in the scaled units.
@@ -78,24 +88,31 @@ def least_squares(
     Returns:
         The last iterate and how the solve ended; never raises for numerical reasons.
     """
+    from fitmat.maths.levenberg_marquardt import LevenbergMarquardt  # which what is kept on disk does not need
 
-    def point(x: Array, args: Any) -> tuple[Array, Normal]:
-        found = normal_equations(lambda at: residual(at, args), x)
-        return jnp.sqrt(found.square), found
-
-    import optimistix as optx  # what is kept on disk needs neither it nor the solver
-
-    from fitmat.maths.levenberg_marquardt import LevenbergMarquardt
+    @jax.jit  # its shapes and its values by one trace
+    def point(x: Array, args: Any) -> tuple[Array, tuple[Normal, Any, float]]:
+        seen = _seen(lambda at: residual(at, args), x)
+        return jnp.sqrt(seen[0].square), seen
 
     solver = LevenbergMarquardt(rtol=tolerance, atol=tolerance, limit=max_steps, damping=damping)
-    solution = optx.least_squares(point, solver, x0, args, has_aux=True, max_steps=None, throw=False)
-    state = solution.state
-    freedom = jax.eval_shape(residual, x0, args).size / max(len(x0), 1) - 1.0
-    offset = relative_offset(state.here, freedom)
-    return Minimum(solution.value, state.here.square, state.settled, state.steps, state.damping, offset)
+    unused: tuple[Any, frozenset[object]] = ({}, frozenset())
+    length, seen = jax.eval_shape(point, x0, args)
+    begin = x0, solver.init(point, x0, args, unused[0], length, seen, unused[1])
+
+    def unfinished(at: tuple[Array, Any]) -> Array:
+        return ~solver.terminate(point, at[0], args, unused[0], at[1], unused[1])[0]
+
+    def step(at: tuple[Array, Any]) -> tuple[Array, Any]:
+        return solver.step(point, at[0], args, unused[0], at[1], unused[1])[:2]
+
+    x, state = jax.lax.while_loop(unfinished, step, begin)
+    here, beside, count = state.here
+    offset = relative_offset(here, count / max(len(x0), 1) - 1.0)
+    return Minimum(x, here.square, state.settled, state.steps, state.damping, offset, beside)
 
 
-def relative_offset(here: Normal, freedom: float) -> Float[Array, ""]:
+def relative_offset(here: Normal, freedom: Any) -> Float[Array, ""]:
     """Length of the Gauss–Newton step in units of the standard errors: √(‖Qᵀr‖²/p ÷ (‖r‖² − ‖Qᵀr‖²)/(n − p)).
 
     Args:

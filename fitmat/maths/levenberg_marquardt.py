@@ -24,12 +24,17 @@ FALL, RISE = 0.1, 4.0
 """What λ is multiplied with after a good step, and after one that was taken back."""
 
 
+Seen = tuple[Normal, Any, Any]
+"""What a function to be minimised returns as its aux: its normal equations, arrays beside them, and how many
+residuals there are."""
+
+
 class _State(eqx.Module):
     """Where an iteration stands.
 
     Attributes:
         trial: The point to look at next.
-        here: Of the point that the iteration stands at.
+        here: Of the point that the iteration stands at, what the function returned as its aux.
         promised: By how much ½ Σ r² falls at `trial` where the residuals are linear.
         damping: λ in the scaled units.
         scale: Unit of each parameter.
@@ -38,7 +43,7 @@ class _State(eqx.Module):
     """
 
     trial: Array
-    here: Normal
+    here: Seen
     promised: Array
     damping: Array
     scale: Array
@@ -49,7 +54,7 @@ class _State(eqx.Module):
 class LevenbergMarquardt(optx.AbstractLeastSquaresSolver):
     """Levenberg 1944, Marquardt 1963, with an eye for rounding.
 
-    The function returns ‖r‖ and, as its aux, `Normal`. Each parameter is measured in units of the inverse norm of its
+    The function returns ‖r‖ and, as its aux, `Seen`. Each parameter is measured in units of the inverse norm of its
     column of the Jacobian at the start (Moré 1978), the residuals in units of their norm, so that one first damping
     suits any problem. The last steps, whose gain is lost in rounding, count as successes.
     """
@@ -67,30 +72,29 @@ class LevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         damping = jnp.asarray(self.damping, y.dtype)
         return _State(y, nothing, jnp.zeros(()), damping, jnp.ones_like(y), jnp.array(0), jnp.array(False))
 
-    def step(
-        self, fn: Any, y: Array, args: Any, options: Any, state: _State, tags: Any
-    ) -> tuple[Array, _State, Normal]:
+    def step(self, fn: Any, y: Array, args: Any, options: Any, state: _State, tags: Any) -> tuple[Array, _State, Seen]:
         """Look at the trial point, go there or not, and choose the next."""
         del options, tags
-        there: Normal = fn(state.trial, args)[1]
+        seen: Seen = fn(state.trial, args)[1]
+        there, old = seen[0], state.here[0]
         first = state.steps == 0
         lengths = jnp.sqrt(jnp.diagonal(there.gram) * FIRST_DAMPING)
         first_unit = jnp.sqrt(there.square)
         natural = jnp.where(lengths > 0, first_unit / jnp.where(lengths > 0, lengths, 1.0), 1.0)
         scale = jnp.where(first, jnp.where(first_unit > 0, natural, 1.0), state.scale)
-        before, after = 0.5 * state.here.square, 0.5 * there.square
+        before, after = 0.5 * old.square, 0.5 * there.square
         gain = before - after
         rounding = 16.0 * jnp.finfo(y.dtype).eps * before
         accept = first | (gain >= BAD * state.promised - rounding)
         grows = ~first & (gain >= GOOD * state.promised - rounding)
         damping = state.damping * jnp.where(accept, jnp.where(grows, FALL, 1.0), RISE)
         new_y = jnp.where(accept, state.trial, y)
-        here = jax.tree.map(lambda new, old: jnp.where(accept, new, old), there, state.here)
+        here = jax.tree.map(lambda new, old: jnp.where(accept, new, old), seen, state.here)
         moved, size = jnp.abs(state.trial - y) / scale, jnp.abs(y) / scale
         small = jnp.all(moved <= self.atol + self.rtol * size)
-        same = jnp.abs(gain) <= self.atol * 0.5 * here.square + self.rtol * before
+        same = jnp.abs(gain) <= self.atol * 0.5 * here[0].square + self.rtol * before
         settled = ~first & accept & small & same
-        step, promised = _ahead(here, scale, damping)
+        step, promised = _ahead(here[0], scale, damping)
         return new_y, _State(new_y + step, here, promised, damping, scale, state.steps + 1, settled), here
 
     def terminate(
@@ -98,7 +102,7 @@ class LevenbergMarquardt(optx.AbstractLeastSquaresSolver):
     ) -> tuple[Bool[Array, ""], optx.RESULTS]:
         """Where the last step was small, the steps ran out, or there is nothing finite to start from."""
         del fn, y, args, options, tags
-        lost = (state.steps > 0) & ~jnp.isfinite(state.here.square)
+        lost = (state.steps > 0) & ~jnp.isfinite(state.here[0].square)
         outcome = optx.RESULTS.where(lost, optx.RESULTS.nonfinite, optx.RESULTS.successful)
         return state.settled | (state.steps >= self.limit) | lost, outcome
 

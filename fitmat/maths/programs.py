@@ -1,8 +1,7 @@
 """Programs: functions compiled once for a machine and kept on its disk, so that a later process traces none of them.
 
-A program is exported (StableHLO) and lies beside what XLA compiled of it, both under a name that holds all that decides
-it: function, structure of its arguments, shapes, the package's own sources, versions, machine. Nothing is unpickled;
-what is damaged is made anew, and where nothing can be kept everything works, only slower. No formula stands here.
+The name of a program holds all that decides it: function, structure of its arguments, shapes, the package's own
+sources, versions, machine. The folder is the business of `program_files`. No formula stands here.
 """
 
 import contextlib
@@ -12,11 +11,8 @@ import hashlib
 import os
 import platform
 import re
-import stat
 import threading
 import types
-import warnings
-import zlib
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from importlib.metadata import version
@@ -25,17 +21,12 @@ from typing import Any
 
 import jax
 import numpy as np
-import platformdirs
 from jax.core import Tracer
+
+from fitmat.maths import program_files
 
 PACKAGE = Path(__file__).parents[1]
 """Whose sources decide what a program computes."""
-
-FOLDER = "FITMAT_CACHE"
-"""Environment variable that names another folder for the programs; empty for none."""
-
-LIMIT = 512 * 2**20
-"""Bytes that the folder may hold; beyond, what was not used for longest is removed."""
 
 LAST = "last-run"
 """File that names the programs of the last run."""
@@ -43,15 +34,13 @@ LAST = "last-run"
 MOST_AHEAD = 16
 """Programs that are loaded ahead."""
 
-HASTE = {"xla_backend_optimization_level": 0}
-"""Options of the compiler for programs that are run once."""
 
-SUFFIX = ".program"
-"""How the names of exported modules end."""
+UNFUSED = {"xla_cpu_use_fusion_emitters": False}
+"""Options of XLA, not more than one: it keeps what it compiled under a name that holds them in no certain order.
 
-_ZSTD = b"\x28\xb5\x2f\xfd"
-
-_DIGEST = hashlib.sha256().digest_size
+Its fusion emitters take 40 % of the seconds of compiling. A loop over values of a model becomes twice as fast by them;
+normal equations, densities and fits do not.
+"""
 
 _CHECKED = ("lapack_dgeqrf_ffi", "lapack_dorgqr_ffi", "lapack_dormqr_ffi", "lapack_dgetrf_ffi", "lapack_dpotrf_ffi",
     "lapack_dtrsm_ffi", "lapack_dsyevd_ffi", "lapack_dgesdd_ffi")  # fmt: skip
@@ -65,8 +54,8 @@ class Program:
     function returns arrays, in tuples or mappings, and uses nothing but its arguments and the package's own constants.
     """
 
-    def __init__(self, function: Callable[..., Any], *, once: bool = False) -> None:
-        self._options = HASTE if once else None
+    def __init__(self, function: Callable[..., Any], *, fused: bool = False) -> None:
+        self._fused = fused
         self._function, self._name = function, function.__name__.strip("_")
         self._lock = threading.Lock()
         self._ready: dict[Any, Callable[..., Any]] = {}
@@ -123,29 +112,60 @@ class Program:
             args, kwargs = jax.tree.unflatten(structure, leaves)
             return self._function(*args, **kwargs)
 
+        shapes = [jax.ShapeDtypeStruct(array.shape, array.dtype) for array in arrays]
         try:
             words = f"{_words(self._function)} {_words(given)} {_surroundings()}"
         except _Unnamed:
-            return self._jit(flat)
+            return _compiled(flat, shapes, self._fused)
         name = f"{self._name}-{hashlib.sha256(words.encode()).hexdigest()[:24]}"
-        _USED.append(name)
-        early = _AHEAD.pop(name, None)
+        _USED.append(f"{name} {_KINDS[self._fused]}")
+        early = _AHEAD.pop(_USED[-1], None)
         run = None if early is None else early.result()
         if run is not None:
             return run
-        exported = _read(name)
+        exported = program_files.read(name)
         if exported is None:
             _tell(given)
             flat.__name__ = name
-            exported = _exported(flat, arrays)
+            exported = _exported(flat, shapes)
             if exported is None:
-                return self._jit(flat)
-            _write(name, exported)
+                return _compiled(flat, shapes, self._fused)
+            program_files.write(name, exported)
+        return _compiled(_calling(exported, name), shapes, self._fused)
 
-        return self._jit(_calling(exported, name))
 
-    def _jit(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        return jax.jit(function, compiler_options=self._options)
+def _compiled(function: Callable[..., Any], shapes: list[Any], fused: bool) -> Callable[..., Any]:
+    lowered = jax.jit(function).lower(*shapes)
+    if _KNOWN and not (fused and not jax.config.read(_HASTE)):
+        try:
+            return lowered.compile(UNFUSED)
+        except jax.errors.JaxRuntimeError as error:
+            if "No such compile option" not in str(error):
+                raise
+            _KNOWN.clear()
+    return lowered.compile()
+
+
+_KNOWN = [True]
+# Empty from when on this release of XLA is known not to know the option.
+
+_KINDS = ("plain", "fused")
+
+_HASTE = "jax_disable_most_optimizations"
+
+
+@contextlib.contextmanager
+def hasty() -> Iterator[None]:
+    """Compile with little effort, in all threads, what is compiled within the block: for what is run once.
+
+    It takes a third of the time, and runs up to five times slower.
+    """
+    before = jax.config.read(_HASTE)
+    jax.config.update(_HASTE, True)
+    try:
+        yield
+    finally:
+        jax.config.update(_HASTE, before)
 
 
 _EVERY: list[Program] = []
@@ -181,9 +201,9 @@ def program(function: Callable[..., Any]) -> Program:
     return Program(function)
 
 
-def program_run_once(function: Callable[..., Any]) -> Program:
-    """The same of a function that is not run often: compiled in a third of the time, and half as fast."""
-    return Program(function, once=True)
+def program_run_often(function: Callable[..., Any]) -> Program:
+    """The same of a function whose loops are worth the compiler's full effort."""
+    return Program(function, fused=True)
 
 
 def clear() -> None:
@@ -193,11 +213,10 @@ def clear() -> None:
     jax.clear_caches()
 
 
-def _exported(flat: Callable[..., Any], arrays: list[Any]) -> Any:
+def _exported(flat: Callable[..., Any], shapes: list[Any]) -> Any:
     """The module of a function; None where JAX cannot export it."""
     from jax import export
 
-    shapes = [jax.ShapeDtypeStruct(array.shape, array.dtype) for array in arrays]
     checks = [export.DisabledSafetyCheck.custom_call(name) for name in _CHECKED]
     try:
         return export.export(jax.jit(flat), disabled_checks=checks)(*shapes)
@@ -270,194 +289,40 @@ def machine() -> str:
         return f"{platform.machine()} {platform.processor()}"
 
 
-def folder() -> Path | None:
-    """Where programs are kept, made for this user alone; None where there is no such place."""
-    return _opened(os.environ.get(FOLDER))[0]
-
-
-@functools.cache
-def _opened(chosen: str | None) -> tuple[Path | None, str]:
-    """The folder, or why there is none; "" where none is wanted."""
-    if chosen == "":
-        return None, ""
-    place = Path(chosen) if chosen else platformdirs.user_cache_path("fitmat") / "programs"
-    try:
-        place.mkdir(mode=0o700, parents=True, exist_ok=True)
-        found = place.stat()
-        if hasattr(os, "getuid"):
-            if found.st_uid != os.getuid():
-                return None, f"{place} belongs to another user"
-            if stat.S_IMODE(found.st_mode) & 0o077:
-                place.chmod(0o700)
-        if not os.access(place, os.R_OK | os.W_OK | os.X_OK):
-            return None, f"{place} cannot be written"
-    except OSError as error:
-        return None, f"{place}: {error.strerror or error}"
-    if getattr(jax.config, "jax_compilation_cache_dir", None) is None:
-        jax.config.update("jax_compilation_cache_dir", str(place))
-        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
-        # JAX writes in place: what another process is writing is compiled once more.
-        warnings.filterwarnings("ignore", message="Error (reading|writing) persistent compilation cache entry")
-    return place, ""
-
-
-def _digest(name: str, content: bytes) -> bytes:
-    """Of a file: a whole program under another's name is as wrong as a damaged one."""
-    return hashlib.sha256(name.encode() + content).digest()
-
-
-def _read(name: str) -> Any:
-    """An exported program of the folder; None where there is none, or none that is whole."""
-    place = folder()
-    if place is None:
-        return None
-    from jax import export
-
-    _mend(place, name)
-    path = place / f"{name}{SUFFIX}"
-    try:
-        content = path.read_bytes()
-    except OSError:
-        return None
-    if _digest(name, content[_DIGEST:]) == content[:_DIGEST]:
-        with contextlib.suppress(Exception):
-            found = export.deserialize(bytearray(content[_DIGEST:]))
-            for used in (path, *place.glob(f"jit_{name}-*")):
-                with contextlib.suppress(OSError):
-                    os.utime(used)
-            return found
-    with contextlib.suppress(OSError):
-        path.unlink()
-    return None
-
-
-def _mend(place: Path, name: str) -> None:
-    """Remove what XLA compiled of a program where it cannot be unpacked: JAX would complain, and keep it for ever."""
-    for entry in place.glob(f"jit_{name}-*"):
-        with contextlib.suppress(OSError):
-            content = entry.read_bytes()
-            if content[: len(_ZSTD)] == _ZSTD:  # not looked into
-                continue
-            try:
-                zlib.decompress(content)
-            except zlib.error:
-                entry.unlink()
-
-
-def _write(name: str, exported: Any) -> None:
-    """Keep an exported program; what the disk refuses is not kept."""
-    place = folder()
-    if place is None:
-        return
-    content = bytes(exported.serialize())
-    draft = place / f".{name}.{os.getpid()}.{threading.get_ident()}"
-    try:
-        draft.write_bytes(_digest(name, content) + content)
-        os.replace(draft, place / f"{name}{SUFFIX}")
-        _prune(place)
-    except OSError:
-        with contextlib.suppress(OSError):
-            draft.unlink()
-
-
 def load_ahead() -> None:
     """Load, in a thread, what the last run used, while this one has other things to do; `remember` ends a run."""
-    place = folder()
+    place = program_files.folder()
     if place is None:
         return
     try:
-        names = (place / LAST).read_text(encoding="ascii", errors="replace").split()
+        lines = (place / LAST).read_text(encoding="ascii", errors="replace").splitlines()
     except OSError:
         return
-    known = [name for name in names[:MOST_AHEAD] if re.fullmatch(r"\w+-[0-9a-f]{24}", name)]
+    known = [line for line in lines[:MOST_AHEAD] if _NOTED.fullmatch(line)]
     pool = ThreadPoolExecutor(1)
-    _AHEAD.update({name: pool.submit(_loaded, name) for name in known})
+    _AHEAD.update({line: pool.submit(_loaded, *line.split()) for line in known})
     pool.shutdown(wait=False)
 
 
-def _loaded(name: str) -> Callable[..., Any] | None:
+_NOTED = re.compile(rf"\w+-[0-9a-f]{{24}} ({'|'.join(_KINDS)})")
+
+
+def _loaded(name: str, kind: str) -> Callable[..., Any] | None:
     """A program of the folder, ready to run; None where there is none."""
-    exported = _read(name)
+    exported = program_files.read(name)
     if exported is None:
         return None
-
     shapes = [jax.ShapeDtypeStruct(given.shape, given.dtype) for given in exported.in_avals]
     with contextlib.suppress(Exception):
-        return jax.jit(_calling(exported, name)).lower(*shapes).compile()
+        return _compiled(_calling(exported, name), shapes, kind == _KINDS[True])
     return None
 
 
 def remember() -> None:
     """Note which programs this run used, for `load_ahead` of the next."""
-    place = folder()
+    place = program_files.folder()
     if place is not None and _USED:
         draft = place / f".{LAST}.{os.getpid()}"
         with contextlib.suppress(OSError):
             draft.write_text("\n".join(dict.fromkeys(_USED)), encoding="ascii")
             os.replace(draft, place / LAST)
-
-
-@dataclasses.dataclass(frozen=True)
-class Kept:
-    """What the folder holds.
-
-    Attributes:
-        folder: Where it is; None where there is none.
-        why: Why there is none.
-        programs: How many.
-        size: Of all files, bytes.
-    """
-
-    folder: Path | None
-    why: str
-    programs: int
-    size: int
-
-    @property
-    def amount(self) -> str:
-        """How many, and how much."""
-        return f"{self.programs} compiled programs, {self.size / 1e6:.1f} MB"
-
-    @property
-    def words(self) -> str:
-        """One sentence."""
-        if self.folder is None:
-            return f"Compiled programs are not kept{f' ({self.why})' if self.why else ''}: each run compiles anew."
-        return f"{self.amount}, are kept in {self.folder}."
-
-
-def kept() -> Kept:
-    """What the folder holds."""
-    place, why = _opened(os.environ.get(FOLDER))
-    files = list(_files(place))
-    count, size = sum(path.suffix == SUFFIX for path, _ in files), sum(found.st_size for _, found in files)
-    return Kept(place, why, count, size)
-
-
-def remove() -> Kept:
-    """Empty the folder; returns what was there."""
-    before = kept()
-    for path, _ in _files(folder()):
-        with contextlib.suppress(OSError):
-            path.unlink()
-    return before
-
-
-def _files(place: Path | None) -> Iterator[tuple[Path, os.stat_result]]:
-    for path in () if place is None else place.iterdir():
-        with contextlib.suppress(OSError):
-            found = path.lstat()
-            if stat.S_ISREG(found.st_mode):
-                yield path, found
-
-
-def _prune(place: Path) -> None:
-    """Remove the files that were not used for longest until the rest is below `LIMIT`."""
-    files = sorted(_files(place), key=lambda item: item[1].st_mtime)
-    excess = sum(found.st_size for _, found in files) - LIMIT
-    for path, found in files:
-        if excess <= 0:
-            return
-        with contextlib.suppress(OSError):
-            path.unlink()
-            excess -= found.st_size

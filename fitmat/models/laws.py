@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from fitmat.maths.programs import program_run_once
+from fitmat.maths.programs import program
 from fitmat.models.albedo import albedo
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import Entry, bounds, entries, vector, with_vector
@@ -195,7 +195,7 @@ def unbounded(template: AbstractBRDF) -> int:
     return int(_not_finite(template, np.array(rows), wi, wo))
 
 
-@program_run_once
+@program
 def _not_finite(template: AbstractBRDF, values: Array, wi: Array, wo: Array) -> Array:
     def total(v: Array, a: Array, b: Array) -> Array:
         return jnp.sum(with_vector(template, v)(a, b))

@@ -12,7 +12,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from fitmat._types import Samples
 from fitmat.maths.mapping import mapped
-from fitmat.maths.programs import program
+from fitmat.maths.programs import program_run_often
 from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.parameters import vector, with_vector
@@ -119,7 +119,7 @@ def _filled(part: np.ndarray, count: int) -> np.ndarray:
     return np.pad(np.asarray(part, float), ((0, count - len(part)), (0, 0)), mode="edge")
 
 
-@program
+@program_run_often
 def _block(
     template: AbstractBRDF, draws: ArrayLike, wi: ArrayLike, wo: ArrayLike, count: ArrayLike
 ) -> tuple[Float[Array, "D N c"], Float[Array, " D"]]:

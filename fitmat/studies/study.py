@@ -4,8 +4,10 @@ What people see of it, `reports` makes; nothing is written or printed here.
 """
 
 import dataclasses
+import os
 import shutil
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -226,10 +228,11 @@ def judge(
     along = sections(posteriors[0].fit.measurements)
     looked_at = _detailed(usable, match, choice)
     findings = []
-    for posterior in posteriors:
-        say(f"examining {posterior.fit.name}", 0, 0)
-        found = find(posterior, along)
-        findings.append(_examined(found, seed, second_opinion, say) if posterior in looked_at else found)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for found in pool.map(lambda posterior: find(posterior, along), posteriors):
+            say(f"examining {found.name}", 0, 0)
+            detailed = found.posterior in looked_at
+            findings.append(_examined(found, seed, second_opinion, say) if detailed else found)
     return Study(tuple(findings), match, choice, full)
 
 

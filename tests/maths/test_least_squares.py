@@ -43,11 +43,11 @@ class Score:
 def _solve(problem: Problem, x: Array, y: Array, x0: Array, max_steps: int) -> tuple[Minimum, Array]:
     """The minimum and the standard deviations √diag(s²(JᵀJ)⁻¹)."""
 
-    def residual(b: Array, _: None) -> Array:
+    def residual(b: Array) -> Array:
         return problem.formula(b, x) - y
 
-    end = least_squares(residual, x0, tolerance=1e-12, max_steps=max_steps)
-    r, inverse = residual(end.x, None), jnp.linalg.inv(jnp.linalg.qr(jax.jacfwd(residual)(end.x, None), mode="r"))
+    end = least_squares(lambda b, _: (residual(b), None), x0, tolerance=1e-12, max_steps=max_steps)
+    r, inverse = residual(end.x), jnp.linalg.inv(jnp.linalg.qr(jax.jacfwd(residual)(end.x), mode="r"))
     return end, jnp.sqrt(r @ r / (len(y) - len(x0)) * jnp.sum(inverse**2, axis=1))
 
 
@@ -126,8 +126,8 @@ def test_units_do_not_matter(of_x: list[float], of_residual: float, max_steps: i
 
     @jax.jit  # one program for both, so that nothing is rounded in another order
     def path(units: Array, of_residual: Array) -> Minimum:
-        def residual(b: Array, _: None) -> Array:
-            return of_residual * (MISRA1A.formula(b / units, x) - y)
+        def residual(b: Array, _: None) -> tuple[Array, None]:
+            return of_residual * (MISRA1A.formula(b / units, x) - y), None
 
         return least_squares(residual, x0 * units, tolerance=1e-12, max_steps=max_steps)
 
@@ -150,13 +150,13 @@ def test_copies_of_the_data_have_the_minimum_of_one() -> None:
 
 def test_a_start_at_the_minimum_stays() -> None:
     """Zero residuals and a parameter that nothing depends on would divide by zero if taken as units."""
-    end = least_squares(lambda b, _: jnp.array([b[0] - 2.0, 3.0 * (b[0] - 2.0)]), jnp.array([2.0, 5.0]))
+    end = least_squares(lambda b, _: (jnp.array([b[0] - 2.0, 3.0 * (b[0] - 2.0)]), None), jnp.array([2.0, 5.0]))
     np.testing.assert_array_equal(end.x, [2.0, 5.0])
 
 
 def test_nothing_to_move_is_a_minimum() -> None:
     """Where all is fixed."""
-    end = least_squares(lambda b, _: jnp.array([3.0, 4.0]), jnp.zeros(0))
+    end = least_squares(lambda b, _: (jnp.array([3.0, 4.0]), None), jnp.zeros(0))
     assert end.solved
     assert (end.x.shape, float(end.square)) == ((0,), 25.0)
 

@@ -22,8 +22,9 @@ import fitmat as fm
 from fitmat.fitting import information
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.likelihood import prepare
-from fitmat.maths import programs
-from fitmat.maths.programs import SUFFIX, Program, kept, program, remove
+from fitmat.maths import program_files, programs
+from fitmat.maths.program_files import SUFFIX, kept, remove
+from fitmat.maths.programs import Program, program
 from fitmat.measurements.noise import measured_noise
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.lobes.lambert import Lambert
@@ -207,9 +208,9 @@ def traced(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     names: list[str] = []
     exported = programs._exported
 
-    def noted(flat: Any, arrays: list[Any]) -> Any:
+    def noted(flat: Any, shapes: list[Any]) -> Any:
         names.append(flat.__name__)
-        return exported(flat, arrays)
+        return exported(flat, shapes)
 
     monkeypatch.setattr(programs, "_exported", noted)
     return names
@@ -305,7 +306,7 @@ def test_a_foreign_file_is_replaced(place: Path, given: Arguments, traced: list[
     (path,) = files(place)
     if foreign == "bytes":
         content = b"not a module"
-        path.write_bytes(programs._digest(path.stem, content) + content)
+        path.write_bytes(program_files._digest(path.stem, content) + content)
     else:
         count = 5 if "other" in foreign else len(wi)
         other = fm.model("lambert+blinn-phong", channels=2)
@@ -337,7 +338,7 @@ def assert_unkept(given: Arguments, traced: list[str]) -> None:
 def test_none_is_wanted(given: Arguments, traced: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FITMAT_CACHE", "")
     assert_unkept(given, traced)
-    assert programs.folder() is None
+    assert program_files.folder() is None
 
 
 @pytest.mark.parametrize("below", [False, True])
@@ -353,7 +354,7 @@ def test_the_folder_is_read_only(
 ) -> None:
     place.mkdir(mode=0o500)
     # The superuser, who may run the tests, may write it all the same: say what others are told.
-    monkeypatch.setattr(programs.os, "access", lambda _, mode: not mode & os.W_OK)
+    monkeypatch.setattr(program_files.os, "access", lambda _, mode: not mode & os.W_OK)
     assert_unkept(given, traced)
     assert list(place.iterdir()) == []
     assert stat.S_IMODE(place.stat().st_mode) == 0o500
@@ -368,7 +369,7 @@ def test_the_disk_refuses(
 
     sources = programs._surroundings()  # reads them
     monkeypatch.setattr(programs, "_surroundings", lambda: sources)
-    monkeypatch.setattr(programs.os if call == "replace" else Path, call, refuse)
+    monkeypatch.setattr(program_files.os if call == "replace" else Path, call, refuse)
     assert_unkept(given, traced)
     monkeypatch.undo()
     assert not list(place.glob(".*"))
@@ -382,7 +383,7 @@ def test_the_folder_is_for_this_user_alone(place: Path, given: Arguments) -> Non
 def test_a_folder_that_is_open_to_others_is_closed(place: Path) -> None:
     place.mkdir()
     place.chmod(0o775)
-    assert programs.folder() == place
+    assert program_files.folder() == place
     assert stat.S_IMODE(place.stat().st_mode) == 0o700
 
 
@@ -391,9 +392,9 @@ def test_a_folder_of_another_user_is_not_used(
 ) -> None:
     place.mkdir()
     owner = os.getuid()
-    monkeypatch.setattr(programs.os, "getuid", lambda: owner + 1)
+    monkeypatch.setattr(program_files.os, "getuid", lambda: owner + 1)
     assert_unkept(given, traced)
-    assert programs.folder() is None
+    assert program_files.folder() is None
     assert list(place.iterdir()) == []
 
 
@@ -410,13 +411,13 @@ def test_what_was_not_used_for_longest_is_removed(
         os.utime(made[-1], (then, then))
     first, _, third = made
     fresh()(model, wi[:2], wo[:2])
-    programs._prune(place)
+    program_files._prune(place)
     assert files(place) == sorted(made)
-    monkeypatch.setattr(programs, "LIMIT", kept().size - 1)
-    programs._prune(place)
+    monkeypatch.setattr(program_files, "LIMIT", kept().size - 1)
+    program_files._prune(place)
     assert files(place) == sorted((first, third))
-    monkeypatch.setattr(programs, "LIMIT", 1)
-    programs._prune(place)
+    monkeypatch.setattr(program_files, "LIMIT", 1)
+    program_files._prune(place)
     assert files(place) == []
 
 
@@ -426,7 +427,7 @@ def test_each_program_that_is_kept_makes_room(place: Path, given: Arguments, mon
     (first,) = files(place)
     then = first.stat().st_mtime - 100
     os.utime(first, (then, then))
-    monkeypatch.setattr(programs, "LIMIT", int(1.5 * first.stat().st_size))
+    monkeypatch.setattr(program_files, "LIMIT", int(1.5 * first.stat().st_size))
     fresh()(model, wi[:3], wo[:3])
     assert len(files(place)) == 1
     assert not first.exists()
