@@ -68,10 +68,12 @@ def rows(chunks: Stream, progress: Progress | None = None) -> Rows:
         chunks: A file, from `large.chunks.scan`, or measurements in memory, from `large.stream.hold`.
         progress: Called after each chunk.
     """
-    known = scatter(chunks, progress)
-    held = isinstance(chunks, Held)
-    prepared = tuple(data for chunk in chunks for data in blocks(chunk, known.of(chunk))) if held else None
-    return Rows(chunks, known, prepared)
+    if not isinstance(chunks, Held):
+        return Rows(chunks, scatter(chunks, progress), None)
+    seen: list[np.ndarray] = []
+    known = scatter(chunks, progress, seen)
+    noises = zip(chunks, (known.at(*pair) for pair in zip(chunks, seen, strict=True)), strict=True)
+    return Rows(chunks, known, tuple(data for chunk, noise in noises for data in blocks(chunk, noise)))
 
 
 def fit_chunks(
@@ -103,10 +105,26 @@ def fit_chunks(
         FitmatError: as `fitting.fit`, and ReadError where the file changed since `scan`.
     """
     every = chunks if isinstance(chunks, Rows) else rows(chunks, progress)
+    return fit_from(every, fit_part(every, to, fixed=fixed, priors=priors, masking=masking), progress)
+
+
+def fit_part(
+    every: Rows,
+    to: str | AbstractBRDF,
+    *,
+    fixed: Mapping[str, ArrayLike] | None = None,
+    priors: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
+    masking: str | None = None,
+) -> Fit:
+    """The fit of the part, with the noise that all rows show; as `fit_chunks`."""
     part = every.chunks.part
     noise = every.known.of_part(part)
     start = fitting.fit(dataclasses.replace(part, sigma=noise.sigma), to, fixed=fixed, priors=priors, masking=masking)
-    start = dataclasses.replace(start, measurements=part, noise=noise)
+    return dataclasses.replace(start, measurements=part, noise=noise)
+
+
+def fit_from(every: Rows, start: Fit, progress: Progress | None = None) -> Fit:
+    """The fit of all rows from that of the part."""
     if not start.finite:
         return start
     file, around = _File(every, start, progress), _Range(start)

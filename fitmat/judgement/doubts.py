@@ -135,12 +135,9 @@ def _doubtful_noise(fit: Fit) -> list[str]:
     m = fit.measurements
     if m.sigma is None:
         return []
-    ratios = []
-    for k in range(len(m.channels)):
-        _, error, factor = leave_one_out(m, k)
-        used = np.isfinite(error)
-        ratios.append(np.abs(error[used]) / (np.sqrt(factor[used]) * m.sigma[used, k]))
-    ratio = np.concatenate(ratios)
+    _, error, factor = leave_one_out(m)
+    used = np.isfinite(error)
+    ratio = np.abs(error[used]) / (np.sqrt(factor[used]) * m.sigma[used])
     if ratio.size < FEWEST:
         return []
     scatter = float(np.quantile(ratio, 0.25)) / QUARTILE

@@ -64,7 +64,7 @@ def measured_noise(m: Measurements) -> Noise:
     """
     if m.sigma is not None:
         return Noise(np.where(m.valid, m.sigma, 1.0), True, "Measurement noise as given in the file.")
-    compared = np.stack([np.stack(leave_one_out(m, k)) for k in range(len(m.channels))], axis=2)
+    compared = leave_one_out(m)
     smooth = np.where(np.isfinite(compared[0]), np.abs(compared[0]), np.abs(m.value))
     tops = np.max(np.abs(m.value), axis=0, where=m.valid, initial=0.0)
     counts = np.count_nonzero(m.valid, axis=0)
@@ -109,7 +109,7 @@ def law_words(laws: Float[np.ndarray, "c 2"], channels: tuple[str, ...]) -> str:
 
 def levels(m: Measurements) -> Float[np.ndarray, "n c"]:
     """|f| as the neighbours of each value show it, in sr⁻¹; its own size where it has none."""
-    found = np.stack([leave_one_out(m, k)[0] for k in range(m.value.shape[1])], axis=1)
+    found = leave_one_out(m)[0]
     return np.where(np.isfinite(found), np.abs(found), np.abs(m.value))
 
 
@@ -146,40 +146,51 @@ def curves(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray, np.nd
     return rows[order], curve[order], angle[order]
 
 
-def leave_one_out(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Per row: the level predicted without it, its error, and the variance of that error in units of σ².
+def leave_one_out(m: Measurements) -> Float[np.ndarray, "3 n c"]:
+    """Per value: the level predicted without it, its error, and the variance of that error in units of σ².
 
-    NaN where a row has neither repeats nor two neighbours on either side.
+    NaN where a value has neither repeats nor two neighbours on either side.
     """
-    level, error, factor = (np.full(m.n_samples, np.nan) for _ in range(3))
-    rows, curve, x = curves(m, channel)
-    if len(rows) == 0:
-        return level, error, factor
-    y = m.value[rows, channel]
+    found = np.full((3, *m.value.shape), np.nan)
+    same: dict[bytes, list[int]] = {}  # channels that are valid in the same rows have the same curves
+    for k in range(m.valid.shape[1]):
+        same.setdefault(m.valid[:, k].tobytes(), []).append(k)
+    for alike in same.values():
+        rows, curve, angle = curves(m, alike[0])
+        if len(rows):
+            found[:, rows[:, None], alike] = _left_out(m.value[rows[:, None], alike], curve, angle)
+    return found
+
+
+def _left_out(y: Float[np.ndarray, "n c"], curve: np.ndarray, x: np.ndarray) -> Float[np.ndarray, "3 n c"]:
+    """`leave_one_out` of values in the order of `curves`."""
+    level, error, factor = found = np.full((3, *y.shape), np.nan)
     new = np.r_[True, (np.diff(curve) != 0) | (np.diff(x) > 1e-6)]
-    group = np.cumsum(new) - 1
-    count = np.bincount(group)
-    mean = np.bincount(group, y) / count
+    first, group = np.flatnonzero(new), np.cumsum(new) - 1
+    count = np.diff(np.r_[first, len(y)])
+    mean = np.add.reduceat(y, first, axis=0) / count[:, None]
     repeated = count[group] > 1
-    error[rows[repeated]] = (y - mean[group])[repeated]
-    factor[rows[repeated]] = (1.0 - 1.0 / count[group])[repeated]
-    level[rows[repeated]] = mean[group][repeated]
+    level[repeated] = mean[group[repeated]]
+    error[repeated] = y[repeated] - level[repeated]
+    factor[repeated] = (1.0 - 1.0 / count[group[repeated]])[:, None]
     x, curve = x[new], curve[new]
     inner = np.arange(2, len(x) - 2)
     inner = inner[(curve[inner - 2] == curve[inner + 2])] if len(x) > 4 else inner[:0]
     near = inner[:, None] + np.array([-2, -1, 1, 2])
-    scale = np.median(np.abs(y)) or 1.0
     gaps = np.diff(x[inner[:, None] + np.arange(-2, 3)], axis=1)
     even = gaps.max(axis=1, initial=0.0) <= _UNEVEN * gaps.min(axis=1, initial=np.inf)
     even &= gaps.min(axis=1, initial=np.inf) > _TOGETHER
+    even &= count[inner] == 1
     inner, near = inner[even], near[even]
     weights = _lagrange(x[near], x[inner])
-    predicted = scale * np.sinh((weights * np.arcsinh(mean[near] / scale)).sum(axis=1))
-    single = count[inner] == 1
-    at = rows[np.flatnonzero(new)[inner[single]]]
-    level[at], error[at] = predicted[single], (mean[inner] - predicted)[single]
-    factor[at] = (1.0 + (weights**2 / count[near]).sum(axis=1))[single]
-    return level, error, factor
+    scale = np.median(np.abs(y), axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    logs = np.arcsinh(mean / scale)
+    at = first[inner]
+    level[at] = scale * np.sinh(sum(weights[:, [k]] * logs[near[:, k]] for k in range(4)))
+    error[at] = mean[inner] - level[at]
+    factor[at] = (1.0 + (weights**2 / count[near]).sum(axis=1))[:, None]
+    return found
 
 
 def _lagrange(nodes: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from jaxtyping import ArrayLike
 from fitmat._types import SAMPLING, Progress
 from fitmat.errors import ModelError
 from fitmat.fitting.losses import DEFAULT
-from fitmat.fitting.streamed import fit_chunks, rows
+from fitmat.fitting.streamed import fit_from, fit_part, rows
 from fitmat.judgement.choice import Choice, choose
 from fitmat.judgement.identifiability.verdicts import identify
 from fitmat.judgement.prediction import sections
@@ -164,13 +164,16 @@ def _pass_over(stream: Stream, jobs: Jobs, seed: int, say: Progress) -> list[Pos
         raise ModelError(f"--loss {loss}: more than {MOST_AT_ONCE:,} rows are fitted under the default loss only.")
     found = []
     every = rows(stream, lambda step, done, total: say(f"reading: {step}", done, total))
-    for name, job in jobs.items():
-        told = {key: value for key, value in job.items() if key != "loss"}
+    say(f"fitting {', '.join(jobs)}: a part of the rows", 0, 0)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        told = [{key: value for key, value in job.items() if key != "loss"} for job in jobs.values()]
+        starts = list(pool.map(lambda name, job: fit_part(every, name, **job), jobs, told))
+    for name, start in zip(jobs, starts, strict=True):
 
         def passing(step: str, done: int, total: int, name: str = name) -> None:
             say(f"fitting {name}: {step}", done, total)
 
-        found.append(laplace(fit_chunks(every, name, **told, progress=passing), seed=seed))
+        found.append(laplace(fit_from(every, start, passing), seed=seed))
     return found
 
 
@@ -228,23 +231,31 @@ def judge(
     along = sections(posteriors[0].fit.measurements)
     looked_at = _detailed(usable, match, choice)
     findings = []
+
+    def looked(posterior: Posterior) -> Findings:
+        found = find(posterior, along)
+        return _examined(found, seed) if posterior in looked_at else found
+
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for found in pool.map(lambda posterior: find(posterior, along), posteriors):
+        for found in pool.map(looked, posteriors):
             say(f"examining {found.name}", 0, 0)
-            detailed = found.posterior in looked_at
-            findings.append(_examined(found, seed, second_opinion, say) if detailed else found)
+            findings.append(found)
+    if second_opinion:
+        findings = [_asked_again(found, seed, say) if found.posterior in looked_at else found for found in findings]
     return Study(tuple(findings), match, choice, full)
 
 
-def _examined(found: Findings, seed: int, second_opinion: bool, say: Progress) -> Findings:
+def _examined(found: Findings, seed: int) -> Findings:
     """With what is asked of a few models only."""
     posterior = found.posterior
     check = None if posterior.fit.loss.robust else check_predictions(posterior, seed=seed)
-    opinion = None
-    if second_opinion:
-        say(f"sampling {posterior.fit.name} a second time", 0, 0)
-        opinion = second_sampler.check_posterior(posterior, seed=seed)
-    return dataclasses.replace(found, identifiability=identify(posterior), check=check, second_opinion=opinion)
+    return dataclasses.replace(found, identifiability=identify(posterior), check=check)
+
+
+def _asked_again(found: Findings, seed: int, say: Progress) -> Findings:
+    """With what another sampler says."""
+    say(f"sampling {found.name} a second time", 0, 0)
+    return dataclasses.replace(found, second_opinion=second_sampler.check_posterior(found.posterior, seed=seed))
 
 
 def _match(posteriors: Sequence[Posterior], full: bool) -> Match | None:

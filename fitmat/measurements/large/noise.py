@@ -34,24 +34,25 @@ class Scatter:
 
     def of(self, chunk: Measurements) -> Noise:
         """σ of a chunk's rows."""
-        if self.given:
-            return measured_noise(chunk)
-        columns = [leave_one_out(chunk, k)[0] for k in range(len(chunk.channels))]
-        return self._at(_smoothed(chunk, np.stack(columns, axis=1)))
+        return self.at(chunk, np.zeros(0) if self.given else leave_one_out(chunk)[0])
 
     def of_part(self, part: Measurements) -> Noise:
         """σ of the rows of the part, whose neighbours were in their chunks."""
-        return measured_noise(part) if self.given else self._at(_smoothed(part, self.levels))
+        return self.at(part, self.levels)
 
-    def _at(self, level: np.ndarray) -> Noise:
-        return Noise(at_level(self.laws, level, self.tops), bool(np.isfinite(self.laws).all()), self.words)
+    def at(self, m: Measurements, levels: np.ndarray) -> Noise:
+        """σ of rows whose f as their neighbours say it is known, (n, c)."""
+        if self.given:
+            return measured_noise(m)
+        sigma = at_level(self.laws, _smoothed(m, levels), self.tops)
+        return Noise(sigma, bool(np.isfinite(self.laws).all()), self.words)
 
 
 def _smoothed(m: Measurements, level: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(level), np.abs(level), np.abs(m.value))
 
 
-def scatter(chunks: Stream, progress: Progress | None = None) -> Scatter:
+def scatter(chunks: Stream, progress: Progress | None = None, seen: list[np.ndarray] | None = None) -> Scatter:
     """The noise of a large file: one pass, unless the file gives σ.
 
     Neighbours are sought in all rows of a chunk, a and b come from the rows of the part. Rows at either end of a chunk
@@ -61,21 +62,26 @@ def scatter(chunks: Stream, progress: Progress | None = None) -> Scatter:
     Args:
         chunks: The file.
         progress: Called after each chunk.
+        seen: Filled with f at all rows of each chunk as their neighbours say it, (n, c), where σ is not given.
     """
     part, count = chunks.part, len(chunks.part.channels)
     if part.sigma is not None:
         none = np.full((count, 2), np.nan)
+        if seen is not None:
+            seen.extend(np.zeros(0) for _ in chunks)
         return Scatter(True, none, none[:, 0], np.full(part.value.shape, np.nan), "")
     found, tops, done = [], np.zeros(count), 0
     for chunk in chunks:
         kept = chunks.in_part(done, chunk.n_samples)
-        compared = [np.stack(leave_one_out(chunk, k), axis=1)[kept] for k in range(count)]
-        found.append(np.stack(compared, axis=2))
+        compared = leave_one_out(chunk)
+        found.append(compared[:, kept])
+        if seen is not None:
+            seen.append(compared[0])
         tops = np.maximum(tops, np.max(np.abs(chunk.value), axis=0, where=chunk.valid, initial=0.0))
         done += chunk.n_samples
         if progress is not None:
             progress("noise", done, chunks.n_samples)
-    levels, errors, factors = np.concatenate(found).transpose(1, 0, 2)
+    levels, errors, factors = np.concatenate(found, axis=1)
     smooth = _smoothed(part, levels)
     laws = np.stack([law(errors[:, k], smooth[:, k], factors[:, k], tops[k], len(errors)) for k in range(count)])
     return Scatter(False, laws, tops, levels, law_words(laws, part.channels))
