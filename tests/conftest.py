@@ -24,7 +24,13 @@ MOST_MAPS = 30_000
 """Memory maps of a process from which on it lets go of its compiled programs; Linux grants 65,530."""
 
 HASTE = "--xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=1"
-"""Saves a third of compiling, which most tests are; the studies run without. At level 0 long walks are too slow."""
+"""Saves a third of compiling, which most tests are; the studies run without."""
+
+MORE_HASTE = "jax_disable_most_optimizations"
+"""Setting of JAX that saves another third, and runs up to five times slower."""
+
+CAREFUL = {"test_base", "test_random_walk", "test_position_free", "test_streamed"}
+"""Files that run longer than they compile, or whose slopes lie close to underflow."""
 
 KNOWS_HASTE = "0.10."
 """Releases of jaxlib that were seen to know these flags: an unknown flag ends the process."""
@@ -44,6 +50,7 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ["FITMAT_COMPILED"] = folder.name
     if config.option.markexpr == "not study" and version("jaxlib").startswith(KNOWS_HASTE):
         os.environ.setdefault("XLA_FLAGS", HASTE)
+        os.environ.setdefault(MORE_HASTE.upper(), "1")
     compiled = Path(os.environ["FITMAT_COMPILED"]) / "fitmat" / "compiled"
     os.environ["XDG_CACHE_HOME"] = os.environ["FITMAT_COMPILED"]
     os.environ["FITMAT_CACHE"] = str(compiled)
@@ -60,8 +67,10 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 
 
 @pytest.fixture(autouse=True, scope="module")
-def _forget_programs() -> Iterator[None]:
-    """Let go of compiled programs after a file if there are many: a process may hold only so many memory maps."""
+def _programs(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Compile as suits the file, and let go of programs afterwards if a process holds many memory maps by them."""
+    hasty = os.environ.get(MORE_HASTE.upper()) == "1" and request.module.__name__.rpartition(".")[2] not in CAREFUL
+    jax.config.update(MORE_HASTE, hasty)
     yield
     maps = Path("/proc/self/maps")
     if not maps.exists() or maps.read_bytes().count(b"\n") > MOST_MAPS:

@@ -296,6 +296,7 @@ def test_default_folder_is_numbered(run, tmp_path):
     assert len(os.listdir(tmp_path)) == 4
 
 
+@pytest.mark.study
 def test_same_seed_same_numbers(run, tmp_path):
     written = []
     for name, seed in (("one", 5), ("two", 5), ("three", 6)):
@@ -329,6 +330,7 @@ def test_interrupted_sampling_keeps_what_is_done(run, tmp_path, monkeypatch):
     assert "sampling was interrupted" in (tmp_path / "out" / "report.html").read_text()
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("part", ["laplace_each", "compare"])
 def test_interrupted_computation_leaves_nothing(run, tmp_path, monkeypatch, part):
     def interrupt(*_: object, **__: object) -> None:
@@ -437,6 +439,7 @@ fitmat.cli.main.main()
 """
 
 
+@pytest.mark.study
 def test_a_default_run_loads_nothing_that_it_does_not_need(environment, tmp_path):
     """The second of two runs, which finds its programs; the page has two pictures and says how to get the others."""
     for name in ("one", "two"):
@@ -450,6 +453,7 @@ def test_a_default_run_loads_nothing_that_it_does_not_need(environment, tmp_path
     assert "fitmat fit --full" in page
 
 
+@pytest.mark.study
 def test_the_folder_of_programs_is_shown_and_cleared(environment, tmp_path):
     here = environment | {"FITMAT_CACHE": str(tmp_path / "programs")}
     assert shell(here, "fit", DATA / "sparse.csv", *QUICK, "--out", tmp_path / "out").returncode in (0, 3)
@@ -460,6 +464,7 @@ def test_the_folder_of_programs_is_shown_and_cleared(environment, tmp_path):
     assert os.listdir(tmp_path / "programs") == []
 
 
+@pytest.mark.study
 def test_a_folder_that_cannot_be_used_is_said_once(environment, tmp_path):
     """The same numbers without it."""
     (tmp_path / "file").write_text("")

@@ -277,6 +277,7 @@ def test_noise_that_cannot_be_estimated_is_unknown(tmp_path: Path) -> None:
     np.testing.assert_allclose(part.sigma, whole.sigma)
 
 
+@pytest.mark.study
 def test_progress_is_told_of_each_pass(coloured: Chunks) -> None:
     told: list[tuple[str, int, int]] = []
     streamed.fit_chunks(coloured, "lambert", progress=lambda what, done, rows: told.append((what, done, rows)))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import fitmat as fm
-from fitmat.maths import programs
+from fitmat.maths import program_files
 from fitmat.measurements.instrument import Instrument
 from fitmat.models import values as door
 from fitmat.models.around.instrument import Seen
@@ -50,7 +50,7 @@ def test_no_count_and_no_parameter_needs_another_program(
 ) -> None:
     """A model is traced once for each of the two blocks, where no earlier process kept a program of it."""
     traced = []
-    monkeypatch.setattr(programs, "folder", lambda: None)
+    monkeypatch.setattr(program_files, "folder", lambda: None)
     door._block.clear()
     monkeypatch.setattr(door, "with_vector", lambda model, draw: traced.append(1) or with_vector(model, draw))
     for kd, count, directions in ((0.123, 2, 7), (0.4, 40, 1500), (0.2, 1, 3)):

@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from selection import always
 
 import fitmat as fm
 from fitmat.fitting.coordinates import coordinates
@@ -104,7 +105,7 @@ def _multiple(model: KullaConty, cos: float) -> float:
     return float(2 * np.pi * np.sum(weights * np.sqrt(co) * co * difference))
 
 
-@pytest.mark.parametrize("alpha", [0.001, 0.01, 0.1, 0.3, 0.6, 1.0])
+@pytest.mark.parametrize("alpha", always({0.001, 0.1, 1.0}, [0.001, 0.01, 0.1, 0.3, 0.6, 1.0]))
 @pytest.mark.parametrize("distribution", DISTRIBUTIONS)
 def test_the_white_furnace_gives_back_all_light(distribution: str, alpha: float) -> None:
     """Single scattering by an integral of its own, multiple scattering by Gauss in √c."""
@@ -129,7 +130,7 @@ def test_albedo_at_alpha_1_and_normal_incidence_is_closed() -> None:
     assert _single("ggx", 1.0, 1 - 1e-12) == pytest.approx(1 - np.log(2), abs=1e-4)
 
 
-@pytest.mark.parametrize("distribution", DISTRIBUTIONS)
+@pytest.mark.parametrize("distribution", always({"ggx"}, DISTRIBUTIONS))
 def test_the_curve_is_as_near_as_stated(distribution: str) -> None:
     cosines = np.array([0.02, 0.05, 0.2, 0.5, 0.9])
     for alpha in (0.01, 0.05, 0.2, 0.7, 1.0):
