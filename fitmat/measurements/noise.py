@@ -27,6 +27,9 @@ UNKNOWN = (
 COPIED = 1e-12
 """A scatter below this fraction of the maximum is that of copied rows, not of repeated measurements."""
 
+LEAST_SIGMA = 1e-9
+"""Of the largest σ: what is smaller counts as this where a law of the noise is sought."""
+
 _DIGITS = 4
 _TOGETHER = np.deg2rad(0.01)
 # Angles are rounded to this to tell curves apart, so that samples closer than it are no neighbours.
@@ -118,7 +121,7 @@ def noise_law(value: Float[np.ndarray, " n"], sigma: Float[np.ndarray, " n"]) ->
     from scipy.optimize import nnls
 
     unit = float(sigma.max())
-    value, sigma = value / unit, sigma / unit
+    value, sigma = value / unit, np.maximum(sigma / unit, LEAST_SIGMA)
     squares = np.stack([np.ones_like(value), value**2], axis=1) / sigma[:, None] ** 2
     scale = np.abs(squares).max(axis=0) + 1e-300
     (a2, b2), _ = nnls(squares / scale, np.ones_like(value)) if len(value) > 1 else ((sigma[0] ** 2 * scale[0], 0.0), 0)

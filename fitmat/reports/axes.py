@@ -11,6 +11,11 @@ BLACK, ORANGE, BLUE, GREEN, PURPLE = "#000000", "#D55E00", "#0072B2", "#009E73",
 FIT_COLOURS = (ORANGE, BLUE, GREEN, PURPLE)
 
 
+def plain(text: str) -> str:
+    """A text in which Matplotlib finds no formula, for names that users choose."""
+    return text.replace("$", r"\$")
+
+
 def new_axes(width: float = 5.0, height: float = 3.6) -> Axes:
     """An empty figure's only axes, without pyplot's global state."""
     return Figure(figsize=(width, height), layout="constrained").add_subplot()

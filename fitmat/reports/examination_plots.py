@@ -15,6 +15,7 @@ from matplotlib.figure import Figure, SubFigure
 from fitmat.judgement.examination.coverage import Incidence
 from fitmat.judgement.examination.examining import Examination
 from fitmat.judgement.examination.features import in_plane_curve
+from fitmat.reports.axes import plain
 
 BESIDE = 4
 """So many maps stand in one row; more stand in rows of three."""
@@ -52,7 +53,7 @@ def examination(found: Examination, *, channel: int | None = None) -> Figure:
     if below is not None:
         plot_curves(found, curves, k, below.add_subplot())
     name = f", channel {m.channels[k]}" if len(m.channels) > 1 else ""
-    sheet.suptitle(f"{m.source}{name}", fontsize=10)
+    sheet.suptitle(plain(f"{m.source}{name}"), fontsize=10)
     return sheet
 
 

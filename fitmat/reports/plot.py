@@ -18,7 +18,7 @@ from fitmat.match.discernibility import SEPARATED, Telling
 from fitmat.match.match import Match
 from fitmat.match.regions import REGIONS
 from fitmat.maths.directions import signed_zenith
-from fitmat.reports.axes import BLACK, BLUE, FIT_COLOURS, GREEN, ORANGE, PURPLE
+from fitmat.reports.axes import BLACK, BLUE, FIT_COLOURS, GREEN, ORANGE, PURPLE, plain
 from fitmat.reports.axes import new_axes as new_axes
 from fitmat.reports.design_plot import design as design
 from fitmat.reports.examination_plots import examination as examination
@@ -115,7 +115,7 @@ def residuals(found: Findings, *, channel: int = 0, ax: Axes | None = None) -> A
     ax.axhspan(-2, 2, color="0.9", zorder=0)
     ax.set(xlim=(-90, 90), xticks=[-60, -30, 0, 30, 60])
     names = fit.measurements.channels
-    ax.set_title(fit.name + (f", channel {names[channel]}" if len(names) > 1 else ""), fontsize=9)
+    ax.set_title(fit.name + (f", channel {plain(names[channel])}" if len(names) > 1 else ""), fontsize=9)
     ax.set_xlabel("θₒ / °  (positive = mirror side)", fontsize=8)
     ax.set_ylabel("residual / standard deviations", fontsize=8)
     ax.tick_params(labelsize=7)
@@ -258,7 +258,7 @@ def corner(posterior: Posterior) -> Figure:
     columns, labels = list(fit.coordinates.places), []
     for name, k in zip(fit.coordinates.names, columns, strict=True):
         channel = name.partition(" ")[1] + name.partition(" ")[2]
-        labels.append(symbols[k].replace("k_d", "$k_d$").replace("k_s", "$k_s$") + channel)
+        labels.append(symbols[k].replace("k_d", "$k_d$").replace("k_s", "$k_s$") + plain(channel))
     draws = posterior.thinned(4000)[0][:, columns]
     spread = np.ptp(draws, axis=0)
     centre = draws.mean(axis=0)

@@ -207,7 +207,7 @@ def _reweighted(fit: Fit, rng: np.random.Generator) -> tuple[np.ndarray | None, 
         if k <= GOOD_PARETO and effective >= ENOUGH:
             break
     if not (k <= GOOD_PARETO and effective >= FEWEST):
-        return None, max(k, np.nextafter(GOOD_PARETO, 1.0))
+        return None, max(k, float(np.nextafter(GOOD_PARETO, 1.0)))
     # Systematic resampling: one random offset, so that a draw of weight w is taken w·m times, up or down to an integer.
     places = np.searchsorted(np.cumsum(weight), (np.arange(LAPLACE_DRAWS) + rng.uniform()) / LAPLACE_DRAWS)
     return rng.permutation(found[np.minimum(places, len(weight) - 1), :-1]), k

@@ -104,7 +104,9 @@ class Posterior:
         if not self.fit.loss.posterior:
             return "no posterior"
         if self.diagnostics is None:
-            return "not sampled" if self.pareto_k is None else ("corrected", "approximate")[self.pareto_k > GOOD_PARETO]
+            if self.pareto_k is None:
+                return "not sampled"
+            return "approximate" if self.pareto_k > GOOD_PARETO else "corrected"
         d = self.diagnostics
         kept = d.steps - d.burn_in
         if not np.isfinite(d.tau).all() or kept < 10 * d.tau.max() or d.rhat.max() > 1.2:

@@ -360,6 +360,12 @@ def test_the_law_of_given_noise_is_found(absolute: float, relative: float) -> No
     assert b == pytest.approx(relative, rel=1e-6, abs=1e-9)
 
 
+def test_a_law_is_sought_where_some_sigma_is_nothing() -> None:
+    """The σ of readings of exactly 0, of which 1/σ² is infinite."""
+    a, b = noise_law(np.array([0.0, 0.5, 1.0]), np.array([5e-324, 0.01, 0.02]))
+    assert np.isfinite([a, b]).all()
+
+
 # --- odd files -------------------------------------------------------------------------------------
 
 

@@ -256,6 +256,16 @@ def test_long_format_by_wavelength_masks_what_is_absent(write):
     assert "Rows that repeat an earlier geometry, all kept: 1." in measured.notes
 
 
+@pytest.mark.parametrize("cell", ["#N/A", "#DIV/0!", "#REF!", "#VALUE!", "#NAME?", "#NUM!", "#NULL!", "#n/a"])
+@pytest.mark.parametrize("mark", [",", ";", "\t", "  "])
+def test_what_spreadsheets_cannot_compute_is_missing_wherever_it_stands(write, cell, mark):
+    """In the first column it is no comment: the row is kept, masked and counted."""
+    rows = [("theta_i", "theta_o", "brdf"), (cell, "45", "0.5"), ("30", "45", cell), ("30", "50", "0.4")]
+    measured = read(write("#N/A means missing\n# and so on\n" + "".join(mark.join(row) + "\n" for row in rows)))
+    assert measured.valid.ravel().tolist() == [False, False, True]
+    assert sum(measured.masked.values()) == 2
+
+
 def test_long_format_by_channel_keeps_the_order_of_appearance():
     table = {
         "theta_i": [30] * 6,

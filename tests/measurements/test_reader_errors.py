@@ -51,6 +51,11 @@ BAD_FILES: dict[str, tuple[str | bytes, str]] = {
         "Zenith,Azimuth,I\n1,2,3\n",
         r"the columns are Zenith, Azimuth, I, expected theta_i \(or .*aoi\) and theta_o .*columns=\"theta_i",
     ),
+    "a name that means empty": (
+        "theta_i,theta_o,brdf,NA\n20,20,0.5,1\n",
+        r"bad\.csv row 1: column 4 is named NA, which means empty, expected a name\. Rename it\.",
+    ),
+    "a dash as a name": ("#\ntheta_i;-;theta_o\n20;1;20\n", r"row 2: column 2 is named -, which means empty"),
     "no header": ("30,45,0.5\n", "no header line and 3 columns, expected theta_i"),
     "no theta_o": ("theta_i,brdf\n30,0.5\n", r"the columns are theta_i, brdf, expected theta_o \(or thetao"),
     "no quantity": ("theta_i,theta_o,I\n30,45,1\n", "expected a measured quantity: brdf, brdf_cos, refl"),

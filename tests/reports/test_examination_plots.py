@@ -115,6 +115,14 @@ def test_odd_files_are_drawn(value: float, tmp_path: Path) -> None:
     assert len(points(sheet)) == (0 if np.isnan(value) else 1)
 
 
+@pytest.mark.parametrize("name", [r"$\frac{$", "a$b$c", r"\$", "_{", "$"])
+def test_names_are_text_whatever_they_look_like(plane: Examination, name: str, tmp_path: Path) -> None:
+    """Of the file and of its channels: no formula is sought in them."""
+    m = plane.measurements
+    named = dataclasses.replace(m, source=f"{name}.csv", channels=tuple(f"{name}{k}" for k in range(len(m.channels))))
+    examination(examine(named)).savefig(tmp_path / "picture.png")
+
+
 def test_pictures_can_be_saved_without_a_warning(plane: Examination, tmp_path: Path) -> None:
     examination(plane).savefig(tmp_path / "picture.png")
     examination(examine(measured((30.0,)))).savefig(tmp_path / "one.png")

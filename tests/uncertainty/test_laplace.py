@@ -10,7 +10,7 @@ from scipy import integrate, stats
 import fitmat as fm
 from fitmat.fitting.result import Fit
 from fitmat.uncertainty.density import log_posterior
-from fitmat.uncertainty.laplace import LAPLACE_DRAWS, MOST_CORRECTED, heavy_tailed, smoothed
+from fitmat.uncertainty.laplace import LAPLACE_DRAWS, MOST_CORRECTED, PROPOSALS, heavy_tailed, smoothed
 from fitmat.uncertainty.posterior import GOOD_PARETO, VERDICTS, Posterior
 from fitmat.uncertainty.quantities import parameters
 
@@ -138,6 +138,14 @@ def test_a_heavy_tail_of_the_weights_forbids_the_correction(near_bound: Fit, mon
     monkeypatch.setattr("fitmat.uncertainty.laplace.smoothed", lambda logs: (np.full(len(logs), 1 / len(logs)), 0.71))
     found = fm.laplace(near_bound, seed=1)
     assert (found.verdict, found.pareto_k) == ("approximate", 0.71)
+
+
+def test_few_effective_draws_forbid_the_correction(near_bound: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the shape of their tail; the file `laplace-few-effective-draws.csv` ended here without a report."""
+    weight = np.r_[1.0, np.zeros(PROPOSALS[1] - 1)]
+    monkeypatch.setattr("fitmat.uncertainty.laplace.smoothed", lambda logs: (weight[: len(logs)], np.float64(0.1)))
+    found = fm.laplace(near_bound, seed=1)
+    assert (found.verdict, type(found.pareto_k)) == ("approximate", float)
 
 
 def test_what_cannot_or_need_not_be_corrected_stays_gaussian(near_bound: Fit) -> None:

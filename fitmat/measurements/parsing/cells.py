@@ -10,13 +10,14 @@ import polars as pl
 
 from fitmat.errors import ReadError
 from fitmat.measurements.parsing import contents
-from fitmat.measurements.parsing.table import MISSING, Table
+from fitmat.measurements.parsing.table import ERROR_VALUES, MISSING, Table
 
 WIDEST = 4096
 """A table of more columns is refused; those of spectrometers have up to 2,000 channels."""
 
 _SPACED = re.compile(r"\d\s+[-+.]?\d")
 _COMMENT = r"^\s*(#|%|//)"
+_ERROR_VALUE = rf"(?i)^\s*({'|'.join(map(re.escape, ERROR_VALUES))})\s*([,;\t]|[-+.\d#]|$)"
 _SEMICOLON = r"^\s*;"
 _BLANK = r"^[\s,;]*$"
 _QUOTED = r'"[^"]*"'
@@ -41,7 +42,7 @@ def parse(text: str, source: str, notes: tuple[str, ...], above: int = 0) -> Tab
     """The table in a text whose first line is line `above` + 1 of its file."""
     lines = pl.DataFrame({"text": re.split(r"\r\n|\r|\n", text)}).with_row_index("line", offset=1 + above)
     lines = lines.filter(~pl.col("text").str.contains(_BLANK))
-    comment = lines["text"].str.contains(_COMMENT)
+    comment = lines["text"].str.contains(_COMMENT) & ~lines["text"].str.contains(_ERROR_VALUE)
     delimiter = _delimiter(lines.filter(~comment)["text"].head(_SAMPLE).to_list())
     if delimiter != ";":
         comment |= lines["text"].str.contains(_SEMICOLON)
@@ -54,6 +55,7 @@ def parse(text: str, source: str, notes: tuple[str, ...], above: int = 0) -> Tab
     cells = _cells(rows, delimiter or "\t", source)
     before = lines.filter(comment & (lines["line"] < rows["line"][0]) & lines["text"].str.contains(r"\pL"))
     names = tuple(cells.row(0))
+    _refuse_missing_names(names, source, int(rows["line"][0]))
     if any(_is_number(cell) for cell in names):
         names = _commented(before["text"].tail(1).to_list(), delimiter, cells.width)
     else:
@@ -108,6 +110,16 @@ def _cells(rows: pl.DataFrame, delimiter: str, source: str) -> pl.DataFrame:
         got = f"not a table ({reason}), expected plain cells"
         raise ReadError(f"{source}: {got}. Remove the quotes.") from error
     return cells.select(pl.all().fill_null("").str.strip_chars())
+
+
+def _refuse_missing_names(names: tuple[str, ...], source: str, line: int) -> None:
+    """Stop at a header in which a column has a name that means an empty cell, as "NA" does."""
+    missing = [cell.lower() in MISSING[1:] for cell in names]
+    words = [not lost and cell != "" and not _is_number(cell) for cell, lost in zip(names, missing, strict=True)]
+    if any(missing) and any(words) and all(lost or word for lost, word in zip(missing, words, strict=True)):
+        place = missing.index(True)
+        got = f"column {place + 1} is named {names[place]}, which means empty"
+        raise ReadError(f"{source} row {line}: {got}, expected a name. Rename it.")
 
 
 def _is_number(cell: str) -> bool:
