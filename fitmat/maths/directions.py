@@ -45,8 +45,13 @@ def zenith(directions: np.ndarray) -> Float[np.ndarray, " n"]:
 
 def relative_azimuth(wi: np.ndarray, wo: np.ndarray) -> Float[np.ndarray, " n"]:
     """φ_o − φ_i in radians, folded to [0, π] (isotropic surfaces look the same on both sides)."""
+    return np.abs(signed_azimuth(wi, wo))
+
+
+def signed_azimuth(wi: np.ndarray, wo: np.ndarray) -> Float[np.ndarray, " n"]:
+    """φ_o − φ_i in radians, [−π, π)."""
     difference = np.arctan2(wo[:, 1], wo[:, 0]) - np.arctan2(wi[:, 1], wi[:, 0])
-    return np.abs((difference + np.pi) % (2 * np.pi) - np.pi)
+    return (difference + np.pi) % (2 * np.pi) - np.pi
 
 
 def signed_zenith(wi: np.ndarray, wo: np.ndarray) -> Float[np.ndarray, " n"]:

@@ -132,7 +132,8 @@ def noise_law(value: Float[np.ndarray, " n"], sigma: Float[np.ndarray, " n"]) ->
 def curves(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Valid rows sorted by curve and angle: their indices, their curve's number, the angle along the curve.
 
-    A curve is taken along the sensor's angle, or, where the light's took more values, along that.
+    A curve has one rotation of the sample and one relative azimuth. It is taken along the sensor's angle, or, where the
+    light's took more values, along that.
     """
     rows = np.flatnonzero(m.valid[:, channel])
     still, moving = m.theta_i, m.theta_o
@@ -142,8 +143,10 @@ def curves(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray, np.nd
     flat = np.minimum(m.phi, np.pi - m.phi) < IN_PLANE
     flat |= np.minimum(m.theta_i, m.theta_o) < _TOGETHER
     side = np.where(flat & (m.phi < np.pi / 2), -1.0, 1.0)
-    hundredths = np.round(100.0 * np.rad2deg(np.stack([still, np.where(flat, 0.0, m.phi)])[:, rows]))
-    curve = np.unique(hundredths[0] * 100_000.0 + hundredths[1], return_inverse=True)[1].reshape(-1)
+    # Neither another side of the plane of incidence nor another rotation of the sample is a repeat.
+    across = np.where(flat, 0.0, m.signed_phi)
+    hundredths = np.round(100.0 * np.rad2deg(np.stack([m.rotation, still, across])[:, rows]))
+    curve = np.unique(hundredths.T @ [1e10, 1e5, 1.0], return_inverse=True)[1].reshape(-1)
     angle = (side * moving)[rows]
     order = np.lexsort((angle, curve))
     return rows[order], curve[order], angle[order]

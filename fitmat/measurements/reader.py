@@ -194,6 +194,8 @@ def _oddities(measured: Measurements, distinct: bool) -> Iterator[str]:
 
 def _repeats(measured: Measurements) -> int:
     used = measured.rows(np.flatnonzero(measured.valid.any(axis=1)))
-    theta_i, theta_o, phi = (np.round(angle, _DIGITS) for angle in (used.theta_i, used.theta_o, used.phi))
+    angles = used.rotation, used.theta_i, used.theta_o, used.signed_phi
+    rotation, theta_i, theta_o, phi = (np.round(angle, _DIGITS) for angle in angles)
+    phi = np.where(phi == -np.round(np.pi, _DIGITS), -phi, phi)
     phi = np.where((theta_i == 0) | (theta_o == 0), 0.0, phi)
-    return used.n_samples - pl.DataFrame([theta_i, theta_o, phi]).n_unique()
+    return used.n_samples - pl.DataFrame([rotation, theta_i, theta_o, phi]).n_unique()

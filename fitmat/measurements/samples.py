@@ -11,11 +11,17 @@ from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
 
 from fitmat.errors import ReadError
-from fitmat.maths.directions import from_angles, relative_azimuth, signed_zenith, zenith
+from fitmat.maths.directions import from_angles, relative_azimuth, signed_azimuth, signed_zenith, zenith
 from fitmat.measurements.instrument import IDEAL, Instrument
 
 IN_PLANE = np.deg2rad(0.5)
 """A sample whose azimuth is within this angle of the plane of incidence counts as in-plane."""
+
+DIGITS = 6
+"""Decimals of an angle in radians that tell one rotation of the sample from another."""
+
+SCANNED = 5
+"""Rows that a rotation of the sample has where it was turned between scans."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -80,6 +86,18 @@ class Measurements:
     def phi(self) -> Float[np.ndarray, " n"]:
         """Relative azimuth in radians, [0, π]; π is the mirror side."""
         return relative_azimuth(self.wi, self.wo)
+
+    @property
+    def signed_phi(self) -> Float[np.ndarray, " n"]:
+        """Relative azimuth φ_o − φ_i in radians, [−π, π); the sign is the side of the plane of incidence."""
+        return signed_azimuth(self.wi, self.wo)
+
+    @property
+    def rotation(self) -> Float[np.ndarray, " n"]:
+        """`phi_i` where the sample was turned between scans; 0 where it was not, or each row has its own azimuth."""
+        turned = np.round(self.phi_i, DIGITS) % np.round(2 * np.pi, DIGITS)
+        _, count = np.unique(turned, return_counts=True)
+        return turned if len(count) > 1 and np.median(count) >= SCANNED else np.zeros_like(turned)
 
     @property
     def signed_theta_o(self) -> Float[np.ndarray, " n"]:

@@ -360,6 +360,18 @@ def test_the_law_of_given_noise_is_found(absolute: float, relative: float) -> No
     assert b == pytest.approx(relative, rel=1e-6, abs=1e-9)
 
 
+@pytest.mark.parametrize("azimuths", [5, 24, 25, 72])
+def test_anisotropy_is_judged_however_many_azimuths_there_are(azimuths: int) -> None:
+    """Of a brushed sample and of one that is not."""
+    angles = np.deg2rad([20, 50]), np.deg2rad(np.arange(0, 81, 10))
+    turned = np.arange(azimuths) * 2 * np.pi / azimuths
+    for name, differ in (("ggx-aniso", True), ("ggx", False)):
+        made = fm.simulate(fm.model(name), *angles, phi_i=turned, relative_noise=0.01, absolute_noise=1e-4, seed=1)
+        found = examine(made).consistency.azimuths
+        assert found.judged
+        assert found.differ == differ
+
+
 def test_a_law_is_sought_where_some_sigma_is_nothing() -> None:
     """The σ of readings of exactly 0, of which 1/σ² is infinite."""
     a, b = noise_law(np.array([0.0, 0.5, 1.0]), np.array([5e-324, 0.01, 0.02]))

@@ -40,6 +40,17 @@ def found(m: fm.Measurements) -> tuple[float, float]:
     return float(match[2]), float(match[1]) / 100
 
 
+def test_other_rotations_and_other_sides_of_a_brushed_surface_are_no_repeats() -> None:
+    """Noise of 1 % and no floor: the sample at 12 azimuths, seen on both sides of the plane of incidence."""
+    brushed = fm.model("ggx-aniso", ks=1.0, alpha_x=0.2, alpha_y=0.5, eta=1.5)
+    angles = np.deg2rad([20, 50]), np.deg2rad(np.arange(0, 81, 2))
+    phi, phi_i = np.deg2rad([60, 120, 240, 300]), np.deg2rad(np.arange(0, 360, 30))
+    noise = {"relative_noise": 0.01, "absolute_noise": 0.0}
+    made = fm.simulate(brushed, *angles, phi=phi, phi_i=phi_i, seed=1, **noise)
+    sigma = measured_noise(dataclasses.replace(made, sigma=None)).sigma
+    assert np.median(sigma / made.value) == pytest.approx(0.01, rel=0.1)
+
+
 @pytest.mark.parametrize("repeats", [1, 3])
 @pytest.mark.parametrize(("relative", "absolute"), [(0.02, 0.005), (0.05, 0.02)])
 def test_planted_noise_is_found(relative: float, absolute: float, repeats: int) -> None:

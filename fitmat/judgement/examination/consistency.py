@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.judgement.examination.coverage import settled
-from fitmat.measurements.samples import IN_PLANE, Measurements
+from fitmat.measurements.samples import IN_PLANE, SCANNED, Measurements
 
 TOLERANCE = (np.deg2rad(0.01), np.deg2rad(0.5))
 """Two geometries count as the same within a quarter of the angular step, but not less or more than this."""
@@ -21,7 +21,7 @@ MOST_ROWS = 5000
 """At most this many rows look for their partner, evenly chosen."""
 
 MOST_AZIMUTHS = 24
-"""Azimuths of incidence that are compared with the first one; files with more vary them freely."""
+"""Azimuths of incidence that are compared with the first one, evenly chosen."""
 
 SURE = 1e-6
 """Probability below which a disagreement is not chance."""
@@ -138,12 +138,13 @@ def _turned(m: Measurements, place: np.ndarray, usable: np.ndarray, tolerance: f
     """Pairs of rows that differ in the azimuth of incidence only, each azimuth against the first one."""
     tilted = usable[m.theta_i[usable] > IN_PLANE]
     azimuths = settled(m.phi_i[tilted], turn=2 * np.pi)
-    if not 2 <= len(azimuths) <= MOST_AZIMUTHS:
+    if not 2 <= len(azimuths) <= len(tilted) / SCANNED:  # else each row has an azimuth of its own
         return np.zeros(0, int), np.zeros(0, int), np.zeros(0)
-    away = (m.phi_i[tilted, None] - azimuths + np.pi) % (2 * np.pi) - np.pi
-    group = np.abs(away).argmin(axis=1)
+    edges = (azimuths + np.append(azimuths[1:], azimuths[0] + 2 * np.pi)) / 2
+    group = np.searchsorted(edges, m.phi_i[tilted] % (2 * np.pi)) % len(azimuths)
     first = tilted[group == 0]
-    found = [_pairs(place, place, first, tilted[group == k], tolerance) for k in range(1, len(azimuths))]
+    chosen = np.unique(np.linspace(1, len(azimuths) - 1, MOST_AZIMUTHS).round().astype(int))
+    found = [_pairs(place, place, first, tilted[group == k], tolerance) for k in chosen]
     return tuple(np.concatenate(parts) for parts in zip(*found, strict=True))
 
 

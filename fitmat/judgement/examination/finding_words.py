@@ -3,6 +3,7 @@
 It computes nothing; warnings are kept apart from description.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -90,6 +91,8 @@ def _placed(p: Peak) -> str:
         return "in the mirror direction, where the curve ends"
     if p.at_end:
         return f"the largest value lies at the end of the curve, {say.degrees(abs(p.offset))} from the mirror direction"
+    if not math.isfinite(p.error):
+        return f"the largest value lies {say.degrees(abs(p.offset))} from the mirror direction"
     if 3 * p.error > VAGUE:
         return f"too flat to be placed, the largest value lies {say.degrees(abs(p.offset))} from the mirror direction"
     if abs(p.offset) < 3 * p.error:
