@@ -56,8 +56,8 @@ def ours(data: Data, s: np.ndarray) -> tuple[Callable[[], Minimum], Callable[[Mi
     template = fm.model("lambert+ggx", channels=1, **START)
     moved, values = coordinates(template), vector(template)
 
-    def residual(u: jax.Array, args: tuple) -> jax.Array:
-        return every_residual(with_vector(template, moved.from_unbounded(jnp.asarray(values), u)), *args)
+    def residual(u: jax.Array, args: tuple) -> tuple[jax.Array, None]:
+        return every_residual(with_vector(template, moved.from_unbounded(jnp.asarray(values), u)), *args), None
 
     def minimum(u: jax.Array, data: Data, s: jax.Array, damping: float) -> Minimum:
         return least_squares(residual, u, (data, s, transformed(data, s)), damping=damping)

@@ -15,7 +15,6 @@ from rich.progress import track
 from rich.table import Table
 from rich.text import Text
 
-from fitmat.cli import process
 from fitmat.fitting.losses import LOSSES
 from fitmat.maths import programs
 from fitmat.models import laws
@@ -133,7 +132,9 @@ def check(*, seed: int = 0, only: Callable[[str], bool] = lambda name: True) -> 
 
 def _measured(name: str, seed: int) -> dict[str, laws.Finding]:
     """The laws of one lobe, in a process that holds no more than one lobe's programs."""
-    process.set_up()
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
     with programs.hasty():
         found = laws.check(model(laws.example(name)), seed=seed)
     programs.clear()

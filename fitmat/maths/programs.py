@@ -35,7 +35,7 @@ MOST_AHEAD = 16
 """Programs that are loaded ahead."""
 
 
-UNFUSED = {"xla_cpu_use_fusion_emitters": False}
+UNFUSED: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False}
 """Options of XLA, not more than one: it keeps what it compiled under a name that holds them in no certain order.
 
 Its fusion emitters take 40 % of the seconds of compiling. A loop over values of a model becomes twice as fast by them;

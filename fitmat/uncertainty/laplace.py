@@ -101,13 +101,13 @@ def laplace_each(
     say, total = progress or (lambda *_: None), len(jobs) if many else 0
     say(words, 0, total)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        pending = {pool.submit(one, name): name for name in reversed(jobs)}  # what takes longest stands last
+        pending = {pool.submit(one, name): name for name in reversed(list(jobs))}  # what takes longest stands last
         for done, job in enumerate(as_completed(pending), 1):
             if job.exception() is not None:
                 pool.shutdown(cancel_futures=True)
                 break
             say(f"{words}, {pending[job]} is done" if many else words, min(done, total), total)
-        return [job.result() for job in reversed(pending) if not job.cancelled()]
+        return [job.result() for job in reversed(list(pending)) if not job.cancelled()]
 
 
 def gaussian(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
@@ -196,7 +196,7 @@ def _reweighted(fit: Fit, rng: np.random.Generator) -> tuple[np.ndarray | None, 
     """Resampled draws of the sampled coordinates (None where the weights are no good), and k̂ of the weights."""
     around, density = heavy_tailed(fit), log_posterior(fit)
     found, weight, k, effective = np.zeros((0, fit.coordinates.count + 2)), np.zeros(0), np.inf, 0.0
-    for count in np.diff(PROPOSALS, prepend=0):
+    for count in np.diff(PROPOSALS, prepend=0).tolist():
         proposed = around.drawn_inside(count, rng)
         logs = density(proposed) - around.log_density(proposed) if len(proposed) else np.zeros(0)
         found = np.concatenate([found, np.column_stack([proposed, logs])[np.isfinite(logs)]])

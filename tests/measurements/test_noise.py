@@ -45,8 +45,7 @@ def test_other_rotations_and_other_sides_of_a_brushed_surface_are_no_repeats() -
     brushed = fm.model("ggx-aniso", ks=1.0, alpha_x=0.2, alpha_y=0.5, eta=1.5)
     angles = np.deg2rad([20, 50]), np.deg2rad(np.arange(0, 81, 2))
     phi, phi_i = np.deg2rad([60, 120, 240, 300]), np.deg2rad(np.arange(0, 360, 30))
-    noise = {"relative_noise": 0.01, "absolute_noise": 0.0}
-    made = fm.simulate(brushed, *angles, phi=phi, phi_i=phi_i, seed=1, **noise)
+    made = fm.simulate(brushed, *angles, phi=phi, phi_i=phi_i, relative_noise=0.01, absolute_noise=0.0, seed=1)
     sigma = measured_noise(dataclasses.replace(made, sigma=None)).sigma
     assert np.median(sigma / made.value) == pytest.approx(0.01, rel=0.1)
 
