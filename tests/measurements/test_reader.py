@@ -331,16 +331,27 @@ def test_one_bad_channel_masks_one_value():
     [
         ([1.0, -1.0, -1.0], {"sentinel -1": 2}, False),
         ([1.0, -0.01, -0.02], {}, "Negative values kept as noise: 2."),
-        ([1.0, 2.0, -999.0], {}, "Negative values kept as noise: 1."),
+        ([1.0, 2.0, -999.0], {"sentinel -999": 1}, False),
+        ([1.0, -0.01, -999.0], {"sentinel -999": 1}, "Negative values kept as noise: 1."),
+        ([-9999.0, 1.0, 9.96921e36], {"sentinel -9999": 1, "sentinel 9.96921e+36": 1}, False),
+        ([1.0, 2.0, -998.0], {}, "Negative values kept as noise: 1."),
         ([1.0, 0.0, 0.0], {}, False),
     ],
 )
 def test_negative_values(values, masked, note):
     measured = read({"theta_i": [30] * 3, "theta_o": [40, 45, 50], "reflectance_factor": values})
     assert measured.masked == masked
-    assert measured.valid[:, 0].tolist() == [value >= 0 or not masked for value in values]
+    assert measured.valid[:, 0].tolist() == [f"sentinel {value:g}" not in masked for value in values]
     kept = [text for text in measured.notes if "Negative values" in text]
     assert kept == ([note] if note else [])
+
+
+def test_a_sentinel_of_a_signal_is_no_reading():
+    """Nor is its ratio to the reference, nor a σ that stands for nothing."""
+    table = {"theta_i": [30] * 4, "theta_o": [40, 45, 50, 55], "signal": [1.0, -999.0, 1.0, 1.0]}
+    measured = read({**table, "reference": [2.0, 2.0, -9999.0, 2.0], "sigma": [0.1, 0.1, 0.1, -99.0]}, panel=1.0)
+    assert measured.valid[:, 0].tolist() == [True, False, False, False]
+    assert measured.masked["sentinel -999"] == 1
 
 
 def test_repeats_are_the_same_directions_however_written():

@@ -16,12 +16,12 @@ from fitmat._types import Progress
 from fitmat.errors import ReadError
 from fitmat.measurements.instrument import IDEAL, Instrument
 from fitmat.measurements.large import tables
-from fitmat.measurements.large.first_pass import FirstPass, joined_rows, magnitudes, named
+from fitmat.measurements.large.first_pass import FirstPass, joined_rows, magnitudes
 from fitmat.measurements.large.stream import CHUNK, PART, is_kept
 from fitmat.measurements.options import Options
 from fitmat.measurements.parsing import contents, tabular
 from fitmat.measurements.parsing.columns import assign
-from fitmat.measurements.parsing.recording import Recording
+from fitmat.measurements.parsing.recording import Recording, named
 from fitmat.measurements.parsing.table import Table
 from fitmat.measurements.reader import FORMATS, measured
 from fitmat.measurements.samples import Measurements

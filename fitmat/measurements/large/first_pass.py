@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from fitmat.measurements.large.stream import is_kept
-from fitmat.measurements.parsing.recording import Recording, mask
+from fitmat.measurements.parsing.recording import SENTINELS, Recording, mask, named, sentinels
 from fitmat.measurements.parsing.table import Table
 
 
@@ -100,8 +100,8 @@ class _Negatives:
         return self.count > 1 and self.lowest == self.highest
 
     def with_those(self, value: np.ndarray, valid: np.ndarray) -> "_Negatives":
-        negative = value[value < 0]
-        used = valid & (value < 0)
+        below = (value < 0) & ~np.isin(value, SENTINELS)
+        negative, used = value[below], valid & below
         return _Negatives(
             self.count + len(negative),
             float(np.min(negative, initial=self.lowest)),
@@ -141,10 +141,6 @@ def joined_rows(recordings: Sequence[Recording]) -> Recording:
 
 
 def magnitudes(recording: Recording, doubts: Mapping[str, np.ndarray]) -> Recording:
-    """The recording without its signs, in which `mask` finds no sentinel of its own."""
-    return dataclasses.replace(recording, value=np.abs(recording.value), doubts={**recording.doubts, **doubts})
-
-
-def named(sentinel: float) -> str:
-    """The reason for which its rows are masked, as `fitmat.measurements.parsing.recording.mask` words it."""
-    return f"sentinel {sentinel:g}"
+    """The recording without its signs, in which `mask` finds no negative number that stands for nothing by itself."""
+    known = {**recording.doubts, **sentinels(recording.value), **doubts}
+    return dataclasses.replace(recording, value=np.abs(recording.value), doubts=known)

@@ -15,6 +15,13 @@ HORIZON = np.sin(ROUNDING)
 """Cosine of a zenith angle at or below which a direction counts as horizontal."""
 
 
+_FILLS = (1e20, 1e30, 1e34, 1e36, 1e38, 9.96921e36, 9.969209968386869e36, 3.4028235e38, 3.4028234663852886e38)
+# Of NetCDF and other programs; the longer of two are the shorter in single precision.
+
+SENTINELS = (-99.0, -999.0, -9999.0, -99999.0, -999999.0, -32768.0, *_FILLS, *(-fill for fill in _FILLS))
+"""Numbers that programs write for "no datum"; no surface and no detector has them."""
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Recording:
     """n rows of c channels in the file's own quantity, NaN where it has nothing.
@@ -81,11 +88,23 @@ def pivot(long: Recording, labels: np.ndarray) -> Recording:
     )
 
 
+def sentinels(value: Float[np.ndarray, "n c"]) -> dict[str, Bool[np.ndarray, "n c"]]:
+    """Reason → where the values are one of `SENTINELS`."""
+    found = np.isin(value, SENTINELS)
+    return {named(number): value == number for number in np.unique(value[found]).tolist()}
+
+
+def named(sentinel: float) -> str:
+    """The reason for which rows with a number that stands for nothing are masked."""
+    return f"sentinel {sentinel:g}"
+
+
 def mask(recording: Recording) -> tuple[Bool[np.ndarray, "n c"], dict[str, int]]:
     """What can be used, and how many rows are masked for each reason; a value counts for its first one."""
     value, sigma = recording.value, recording.sigma
     lowest = np.minimum(recording.wi[:, 2], recording.wo[:, 2])
-    reasons = recording.doubts | {
+    reasons = recording.doubts | sentinels(value)
+    reasons |= {
         "angle missing or infinite": np.any(np.isnan(recording.wi + recording.wo), axis=1, keepdims=True),
         "at or below the horizon": (lowest <= HORIZON)[:, None],
         "value missing or NaN": np.isnan(value),
@@ -93,9 +112,9 @@ def mask(recording: Recording) -> tuple[Bool[np.ndarray, "n c"], dict[str, int]]
     }
     if sigma is not None:
         reasons["sigma missing, infinite or not positive"] = ~(np.isfinite(sigma) & (sigma > 0))
-    negative = value[value < 0]
+    negative = value[(value < 0) & ~np.isin(value, SENTINELS)]
     if len(negative) > 1 and (negative == negative[0]).all():
-        reasons[f"sentinel {negative[0]:g}"] = value == negative[0]
+        reasons[named(negative[0])] = value == negative[0]
     valid = np.ones(value.shape, bool)
     masked = {}
     for reason, bad in reasons.items():

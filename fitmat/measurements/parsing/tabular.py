@@ -12,7 +12,7 @@ from fitmat.measurements.options import Options
 from fitmat.measurements.parsing import contents
 from fitmat.measurements.parsing.angles import directions
 from fitmat.measurements.parsing.columns import assign
-from fitmat.measurements.parsing.recording import Recording, pivot
+from fitmat.measurements.parsing.recording import Recording, pivot, sentinels
 from fitmat.measurements.parsing.table import Table
 from fitmat.measurements.samples import default_channels
 
@@ -38,7 +38,7 @@ def recording(table: Table, columns: str | Mapping[str, str | int] | None, optio
     if layout.quantity == "signal":
         reference = _stacked(table, layout.references)
         spread = _stacked(table, layout.reference_sigmas) if layout.reference_sigmas else None
-        doubts["reference reading not positive"] = ~(reference > 0)
+        doubts |= sentinels(value) | {"reference reading not positive": ~(reference > 0)}
         value, sigma = _ratio((value, sigma), (np.where(reference > 0, reference, np.nan), spread))
     unused = (f"Columns not used: {contents.listed(layout.unused)}.",) if layout.unused else ()
     found = Recording(
@@ -68,7 +68,8 @@ def _ratio(
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is masked
         if sigma_y is None and sigma_r is None:
             return y / r, None
-        apart, shared = (np.zeros_like(y) if sigma is None else sigma for sigma in (sigma_y, sigma_r))
+        given = (np.zeros_like(y) if sigma is None else sigma for sigma in (sigma_y, sigma_r))
+        apart, shared = (np.where(sigma < 0, np.nan, sigma) for sigma in given)  # whose square would hide the sign
         return y / r, np.hypot(apart, y / r * shared) / r
 
 

@@ -182,6 +182,17 @@ def test_a_sentinel_is_one_of_the_whole_file(tmp_path: Path) -> None:
     assert_same(found, fm.read(path))
 
 
+def test_a_usual_sentinel_is_one_beside_other_negative_values(tmp_path: Path) -> None:
+    columns = numbers()
+    columns["brdf"][[3, 300]] = -0.001, -0.002
+    columns["brdf"][[5, 9]] = -999.0, -9999.0
+    path = saved(tmp_path, lines(columns))
+    found = chunks.scan(path, rows=33)
+    assert found.part.masked == {"sentinel -999": 1, "sentinel -9999": 1}
+    assert "Negative values kept as noise: 2." in found.part.notes
+    assert_same(found, fm.read(path))
+
+
 def test_equal_negatives_in_one_chunk_are_noise_if_others_differ(tmp_path: Path) -> None:
     columns = numbers()
     columns["brdf"][[3, 5, 9]] = -0.001
