@@ -256,6 +256,26 @@ def test_long_format_by_wavelength_masks_what_is_absent(write):
     assert "Rows that repeat an earlier geometry, all kept: 1." in measured.notes
 
 
+@pytest.mark.parametrize(
+    ("cells", "expected"),
+    [
+        (('"10,691"', "987"), [10691, 987]),
+        (('"1,234,567"', '"8,765"'), [1234567, 8765]),
+        (('"1,234.5"', '"8,765"'), [1234.5, 8765]),
+        (('"-1,234"', "5"), [-1234, 5]),
+        (('"0,123"', '"1,234"'), [0.123, 1.234]),
+        (('"10,69"', '"1,234"'), [10.69, 1.234]),
+        (('"10,691"', '"0,5"'), [10.691, 0.5]),
+    ],
+)
+def test_commas_with_three_digits_behind_them(write, cells, expected):
+    """Thousands, where the file shows it; decimals, where it shows that."""
+    lines = (f"30,{45 + k},{cell}\n" for k, cell in enumerate(cells))
+    measured = read(write("theta_i,theta_o,brdf\n" + "".join(lines)))
+    assert measured.value[:, 0].tolist() == pytest.approx(expected)
+    assert any("thousands" in note for note in measured.notes) == (expected[0] not in (0.123, 10.69, 10.691))
+
+
 @pytest.mark.parametrize("cell", ["#N/A", "#DIV/0!", "#REF!", "#VALUE!", "#NAME?", "#NUM!", "#NULL!", "#n/a"])
 @pytest.mark.parametrize("mark", [",", ";", "\t", "  "])
 def test_what_spreadsheets_cannot_compute_is_missing_wherever_it_stands(write, cell, mark):

@@ -35,7 +35,10 @@ BAD_FILES: dict[str, tuple[str | bytes, str]] = {
     "broken quotes": ('theta_i,theta_o,brdf\n"30"5,45,0.5\n', "not a table .*Remove the quotes"),
     "text": (GOOD + "30,45,abc\n", "row 3: brdf = abc, expected a number. Correct the cell"),
     "text in an angle": ("#\n" + GOOD + "3O,45,1\n", r"bad\.csv row 4: theta_i = 3O, expected a number"),
-    "thousands": (HEAD + '30,45,"1,234.5"\n', "row 2: brdf = 1,234.5, expected a number"),
+    "thousands or decimals": (
+        HEAD + '30,45,"1,234"\n30,50,"5,678"\n',
+        r"row 2: brdf = 1,234, expected .* it may be 1234 or 1\.234\. Write it without the comma, or with a point\.",
+    ),
     "mixed decimals": ("theta_i;theta_o;brdf\n30;45;0.5\n30;45,5;1\n", "row 3: theta_o = 45,5, expected one"),
     "all masked": (
         HEAD + "30,95,0.5\n30,45,nan\n",

@@ -3,6 +3,7 @@
 It knows no column name and converts no number; a ragged row is refused, never repaired.
 """
 
+import dataclasses
 import os
 import re
 
@@ -24,6 +25,8 @@ _QUOTED = r'"[^"]*"'
 _NUMBER = re.compile(r"[-+−]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?|[-+]?(?i:inf|infinity)")
 _SAMPLE = 20
 _DECIMAL_COMMA = r"^[-+−]?\d*,\d+([eE][-+]?\d+)?$"
+_GROUPED = r"^[-+−]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?$"
+_SURELY_GROUPED = r"^[-+−]?([1-9]\d*|[1-9]\d{0,2}(,\d{3}){2,}|[1-9]\d{0,2}(,\d{3})+\.\d*)$"
 _DECIMAL_POINT = r"^[-+−]?\d*\.\d+([eE][-+]?\d+)?$"
 
 
@@ -64,6 +67,8 @@ def parse(text: str, source: str, notes: tuple[str, ...], above: int = 0) -> Tab
         expected = "expected rows of numbers below it. Is the file complete?"
         raise ReadError(f"{source}: a header and no rows ({contents.listed(names)}), {expected}")
     table = Table(source, names, cells, rows["line"].to_numpy(), notes)
+    if delimiter == ",":
+        table = _without_thousands(table)
     _refuse_mixed_decimals(table)
     return table
 
@@ -134,6 +139,34 @@ def _commented(comments: list[str], delimiter: str | None, width: int) -> tuple[
             if len(words) == width:
                 return tuple(word.strip() for word in words)
     return ("",) * width
+
+
+def _without_thousands(table: Table) -> Table:
+    """The table with "10,691" as 10691, where the commas of its numbers have three digits behind them.
+
+    "0,123" is a decimal comma. So is "10,691", unless the same columns have whole numbers without a comma, more commas
+    than one or a point; where nothing tells, the user is asked.
+
+    Raises:
+        ReadError: the commas may be either.
+    """
+    texts = [table.cells.to_series(k) for k in range(len(table.names))]
+    commas = [text.str.contains(_DECIMAL_COMMA) | text.str.contains(_GROUPED) for text in texts]
+    places = [k for k, comma in enumerate(commas) if comma.any()]
+    if not places or not all(texts[k].filter(commas[k]).str.contains(_GROUPED).all() for k in places):
+        return table
+    sure = any(texts[k].str.contains(_SURELY_GROUPED).any() for k in places)
+    if not sure:
+        expected = (
+            "a number that can be read in one way: it may be {} or {}. Write it without the comma, or with a point"
+        )
+        cell = str(texts[places[0]].filter(commas[places[0]])[0])
+        meant = expected.format(cell.replace(",", ""), cell.replace(",", "."))
+        table.refuse(places[0], commas[places[0]].to_numpy(), f"{meant}.")
+    plain = [texts[k].str.replace_all(",", "") if k in places else texts[k] for k in range(len(texts))]
+    named = contents.listed([table.names[k] or str(k + 1) for k in places])
+    note = f"Commas read as thousands separators in: {named}."
+    return dataclasses.replace(table, cells=pl.DataFrame(plain), notes=(*table.notes, note))
 
 
 def _refuse_mixed_decimals(table: Table) -> None:
