@@ -182,6 +182,7 @@ def _thorough(block: bytes, layout: _Layout, first: int) -> Iterator[Table]:
     head, above = layout.head, layout.prelude.count(b"\n")
     content, notes = contents.decoded(layout.prelude + block, head.source)
     table = cells.parse(content, head.source, notes, above=first - above - 1)
+    cells.refuse_other_commas(table, head)
     table = dataclasses.replace(table, names=head.names)
     if table.cells.width != len(head.names):
         got = f"{table.cells.width} cells, expected {len(head.names)} as in row {head.lines[0]}"

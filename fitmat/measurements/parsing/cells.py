@@ -27,6 +27,7 @@ _SAMPLE = 20
 _DECIMAL_COMMA = r"^[-+−]?\d*,\d+([eE][-+]?\d+)?$"
 _GROUPED = r"^[-+−]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?$"
 _SURELY_GROUPED = r"^[-+−]?([1-9]\d*|[1-9]\d{0,2}(,\d{3}){2,}|[1-9]\d{0,2}(,\d{3})+\.\d*)$"
+_THOUSANDS = "Commas read as thousands separators in:"
 _DECIMAL_POINT = r"^[-+−]?\d*\.\d+([eE][-+]?\d+)?$"
 
 
@@ -165,8 +166,30 @@ def _without_thousands(table: Table) -> Table:
         table.refuse(places[0], commas[places[0]].to_numpy(), f"{meant}.")
     plain = [texts[k].str.replace_all(",", "") if k in places else texts[k] for k in range(len(texts))]
     named = contents.listed([table.names[k] or str(k + 1) for k in places])
-    note = f"Commas read as thousands separators in: {named}."
+    note = f"{_THOUSANDS} {named}."
     return dataclasses.replace(table, cells=pl.DataFrame(plain), notes=(*table.notes, note))
+
+
+def refuse_other_commas(part: Table, head: Table) -> None:
+    """Stop where the commas of a part of a file are read otherwise than those of its head.
+
+    Raises:
+        ReadError: in one of them they separate thousands, in the other decimals.
+    """
+    grouped, decimal = ([of(table) for table in (part, head)] for of in (_has_thousands, _has_commas))
+    if (grouped[0] and decimal[1]) or (grouped[1] and decimal[0]):
+        got = "commas that separate thousands here, or above, and decimals elsewhere"
+        raise ReadError(
+            f"{part.source} row {part.lines[0]}: {got}, expected one reading. Write numbers without commas."
+        )
+
+
+def _has_thousands(table: Table) -> bool:
+    return any(note.startswith(_THOUSANDS) for note in table.notes)
+
+
+def _has_commas(table: Table) -> bool:
+    return any(table.cells.select(pl.all().str.contains(_DECIMAL_COMMA).any()).row(0))
 
 
 def _refuse_mixed_decimals(table: Table) -> None:

@@ -193,6 +193,17 @@ def test_a_usual_sentinel_is_one_beside_other_negative_values(tmp_path: Path) ->
     assert_same(found, fm.read(path))
 
 
+@pytest.mark.parametrize("above", [("0,5", "1,234"), ("5", "1,234")])
+def test_commas_are_read_alike_in_all_chunks(tmp_path: Path, above: tuple[str, str]) -> None:
+    """Decimals above and thousands below, or the other way round, are refused; neither is read in silence."""
+    below = ("5" if above[0] == "0,5" else "0,5", "1,234")
+    rows = [f'10,{k % 80},"{cells[k % 2]}"' for cells in (above, below) for k in range(200)]
+    path = tmp_path / "commas.csv"
+    path.write_text("\n".join(["theta_i,theta_o,brdf", *rows]), encoding="utf-8")
+    with pytest.raises(ReadError, match="commas that separate thousands here, or above, and decimals elsewhere"):
+        chunks.scan(path, rows=33)
+
+
 def test_equal_negatives_in_one_chunk_are_noise_if_others_differ(tmp_path: Path) -> None:
     columns = numbers()
     columns["brdf"][[3, 5, 9]] = -0.001
