@@ -140,11 +140,13 @@ def curves(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray, np.nd
     if len(np.unique(np.round(still[rows], _DIGITS))) > len(np.unique(np.round(moving[rows], _DIGITS))):
         still, moving = moving, still
     # About the normal every azimuth is in the plane, but only at the normal itself are all the same.
-    flat = np.minimum(m.phi, np.pi - m.phi) < IN_PLANE
+    signed = m.signed_phi
+    phi = np.abs(signed)
+    flat = np.minimum(phi, np.pi - phi) < IN_PLANE
     flat |= np.minimum(m.theta_i, m.theta_o) < _TOGETHER
-    side = np.where(flat & (m.phi < np.pi / 2), -1.0, 1.0)
+    side = np.where(flat & (phi < np.pi / 2), -1.0, 1.0)
     # Neither another side of the plane of incidence nor another rotation of the sample is a repeat.
-    across = np.where(flat, 0.0, m.signed_phi)
+    across = np.where(flat, 0.0, signed)
     hundredths = np.round(100.0 * np.rad2deg(np.stack([m.rotation, still, across])[:, rows]))
     curve = np.unique(hundredths.T @ [1e10, 1e5, 1.0], return_inverse=True)[1].reshape(-1)
     angle = (side * moving)[rows]

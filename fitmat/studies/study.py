@@ -230,7 +230,9 @@ def judge(
         choice = choose(usable, predicting=whole, singly=full or len(usable) > 2)
     along = sections(posteriors[0].fit.measurements)
     looked_at = _detailed(usable, match, choice)
-    findings = []
+    findings, count = [], len(posteriors)
+    words = f"examining {', '.join(p.fit.name for p in posteriors) if count <= DETAILED else f'{count} models'}"
+    say(words, 0, count)
 
     def looked(posterior: Posterior) -> Findings:
         found = find(posterior, along)
@@ -238,8 +240,8 @@ def judge(
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for found in pool.map(looked, posteriors):
-            say(f"examining {found.name}", 0, 0)
             findings.append(found)
+            say(words, len(findings), count)
     if second_opinion:
         findings = [_asked_again(found, seed, say) if found.posterior in looked_at else found for found in findings]
     return Study(tuple(findings), match, choice, full)

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from fitmat.measurements.large.stream import is_kept
-from fitmat.measurements.parsing.recording import SENTINELS, Recording, mask, named, sentinels
+from fitmat.measurements.parsing.recording import Recording, is_sentinel, mask, named, sentinels
 from fitmat.measurements.parsing.table import Table
 
 
@@ -100,7 +100,7 @@ class _Negatives:
         return self.count > 1 and self.lowest == self.highest
 
     def with_those(self, value: np.ndarray, valid: np.ndarray) -> "_Negatives":
-        below = (value < 0) & ~np.isin(value, SENTINELS)
+        below = (value < 0) & ~is_sentinel(value)
         negative, used = value[below], valid & below
         return _Negatives(
             self.count + len(negative),

@@ -21,6 +21,8 @@ _FILLS = (1e20, 1e30, 1e34, 1e36, 1e38, 9.96921e36, 9.969209968386869e36, 3.4028
 SENTINELS = (-99.0, -999.0, -9999.0, -99999.0, -999999.0, -32768.0, *_FILLS, *(-fill for fill in _FILLS))
 """Numbers that programs write for "no datum"; no surface and no detector has them."""
 
+_LEAST_FILL, _LEAST_NEGATIVE = min(_FILLS), max(number for number in SENTINELS if number < 0)
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Recording:
@@ -90,8 +92,14 @@ def pivot(long: Recording, labels: np.ndarray) -> Recording:
 
 def sentinels(value: Float[np.ndarray, "n c"]) -> dict[str, Bool[np.ndarray, "n c"]]:
     """Reason → where the values are one of `SENTINELS`."""
-    found = np.isin(value, SENTINELS)
-    return {named(number): value == number for number in np.unique(value[found]).tolist()}
+    return {named(number): value == number for number in np.unique(value[is_sentinel(value)]).tolist()}
+
+
+def is_sentinel(value: Float[np.ndarray, "n c"]) -> Bool[np.ndarray, "n c"]:
+    """Where the values are one of `SENTINELS`; they are looked up only where they lie beyond the least of these."""
+    found = (value <= _LEAST_NEGATIVE) | (value >= _LEAST_FILL)
+    found[found] = np.isin(value[found], SENTINELS)
+    return found
 
 
 def named(sentinel: float) -> str:
@@ -112,7 +120,7 @@ def mask(recording: Recording) -> tuple[Bool[np.ndarray, "n c"], dict[str, int]]
     }
     if sigma is not None:
         reasons["sigma missing, infinite or not positive"] = ~(np.isfinite(sigma) & (sigma > 0))
-    negative = value[(value < 0) & ~np.isin(value, SENTINELS)]
+    negative = value[(value < 0) & ~is_sentinel(value)]
     if len(negative) > 1 and (negative == negative[0]).all():
         reasons[named(negative[0])] = value == negative[0]
     valid = np.ones(value.shape, bool)
