@@ -15,7 +15,7 @@ from fitmat.fitting.result import Fit
 from fitmat.judgement.prediction import standardised_residuals
 from fitmat.maths import normal
 from fitmat.maths.directions import signed_zenith
-from fitmat.measurements.noise import leave_one_out
+from fitmat.measurements.neighbours import leave_one_out
 
 CHANCE = 1e-3
 """Probability, over all values of a file together, from which on a deviation is not put down to chance."""

@@ -13,7 +13,7 @@ from fitmat.fitting.result import Fit
 from fitmat.judgement.prediction import replicated
 from fitmat.maths import binomial, normal
 from fitmat.measurements.incidences import Incidence
-from fitmat.measurements.noise import curves
+from fitmat.measurements.neighbours import curves
 
 REPLICATES = 4000
 """Patterns that are drawn to judge one."""

@@ -12,6 +12,7 @@ import numpy as np
 import polars as pl
 
 from fitmat.errors import ReadError
+from fitmat.measurements.blocked import without_blocked
 from fitmat.measurements.formats import alta, astm, fred, lighttools, merl, parquet, rgl, ssdd, utia, zemax
 from fitmat.measurements.instrument import IDEAL, Instrument
 from fitmat.measurements.options import Options
@@ -134,7 +135,7 @@ def measured(recording: Recording, options: Options) -> Measurements:
     if extreme.any():
         masked |= {"too large or too small a number in sr⁻¹": int(extreme.any(axis=1).sum())}
         valid = valid & ~extreme
-    return Measurements(
+    found = Measurements(
         wi=wi,
         wo=wo,
         value=np.where(valid, value, 0.0),
@@ -145,6 +146,7 @@ def measured(recording: Recording, options: Options) -> Measurements:
         masked=masked,
         notes=(note(recording.quantity, options), *recording.notes),
     )
+    return without_blocked(found)
 
 
 def _recording(source: Source, columns: str | Mapping[str, str | int] | None, options: Options) -> Recording:

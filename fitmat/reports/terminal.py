@@ -34,6 +34,8 @@ def show(found: Study, folder: Path, screen: Console | None = None) -> None:
     first = found.findings[0].fit
     _say(out, str(first.measurements), markup=False)
     _say(out, first.noise.words, markup=False)
+    for warning in found.warnings:
+        _say(out, f"WARNING: {warning}", markup=False)
     if first.n_values > MOST_SAMPLED:
         words = f"More than {MOST_SAMPLED:,} values: intervals from Laplace's approximation, nothing is sampled."
         _say(out, words)

@@ -30,6 +30,7 @@ def to_dict(study: Study) -> dict[str, Any]:
             "masked": m.masked,
             "notes": [*m.notes, *filter(None, [str(m.instrument)])],
             "noise": first.noise.words,
+            "warnings": list(study.warnings),
             "loss": {"name": first.loss.name, "formula": first.loss.formula, "posterior": first.loss.posterior},
             "channels": list(m.channels),
             "fits": [_fit_dict(found) for found in study.findings],

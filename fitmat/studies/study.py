@@ -18,12 +18,14 @@ from fitmat.errors import ModelError
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.streamed import fit_from, fit_part, rows
 from fitmat.judgement.choice import Choice, choose
+from fitmat.judgement.examination.examining import warnings
 from fitmat.judgement.identifiability.verdicts import identify
 from fitmat.judgement.prediction import sections
 from fitmat.judgement.predictive_check import check_predictions
 from fitmat.match.match import Match, compare, is_empirical, is_microfacet
 from fitmat.measurements.large.stream import Stream, hold
 from fitmat.measurements.samples import Measurements
+from fitmat.models.around.tilt import Tilted
 from fitmat.studies.findings import Findings, find
 from fitmat.studies.plan import DEFAULT_MODELS, Jobs, plan
 from fitmat.uncertainty import second_sampler
@@ -50,12 +52,14 @@ class Study:
         match: Of an empirical and a microfacet model among them; None where there is no such pair.
         choice: Which model the data prefer; None under a loss that weighs no models, and of a single model.
         full: Whether everything was asked; see `study`.
+        warnings: What is odd about the measurements themselves, as sentences.
     """
 
     findings: tuple[Findings, ...]
     match: Match | None = None
     choice: Choice | None = None
     full: bool = False
+    warnings: tuple[str, ...] = ()
 
     @property
     def measurements(self) -> Measurements:
@@ -244,7 +248,15 @@ def judge(
             say(words, len(findings), count)
     if second_opinion:
         findings = [_asked_again(found, seed, say) if found.posterior in looked_at else found for found in findings]
-    return Study(tuple(findings), match, choice, full)
+    return Study(tuple(findings), match, choice, full, _odd(posteriors))
+
+
+def _odd(posteriors: Sequence[Posterior]) -> tuple[str, ...]:
+    """What is odd about the measurements; nothing is said of a file of which only a part is at hand."""
+    fit = posteriors[0].fit
+    if fit.n_values > fit.measurements.n_valid:
+        return ()
+    return warnings(fit.measurements, tilted=any(Tilted.prefix in posterior.fit.name for posterior in posteriors))
 
 
 def _examined(found: Findings, seed: int) -> Findings:

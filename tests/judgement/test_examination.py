@@ -17,7 +17,7 @@ from fitmat.judgement.examination.examining import Examination, examine
 from fitmat.judgement.examination.features import peak
 from fitmat.judgement.examination.implied_albedo import implied_albedo
 from fitmat.judgement.examination.prospects import prospects
-from fitmat.measurements.noise import noise_law
+from fitmat.measurements.noise import channel_laws, measured_noise, noise_law
 
 SEEDS = 20
 """Draws of the noise; a check that raises a false alarm in 14 % of clean files is caught in 95 of 100 cases."""
@@ -130,9 +130,25 @@ def added(m: fm.Measurements) -> list[Any]:
 def test_lambert_adds_up_to_its_albedo(grid: dict[str, Any]) -> None:
     """∫ kd/π cosθ dω = kd at every incidence."""
     for a in added(measured("lambert", kd=0.5, **grid)):
-        assert a.value[0] == pytest.approx(0.5 * a.covered, rel=NOISE)
+        assert a.value[0] == pytest.approx(0.5 * (a.covered if a.assumed else 1.0), rel=NOISE)
         assert a.assumed == (grid is not ROUND)
         assert 0.98 < a.covered < 1 + ROUNDING  # a polygon of 24 corners at 88° has 0.987 of the disc
+
+
+@pytest.mark.parametrize("theta_i", [0.2, 0.8, 1.2])
+@pytest.mark.parametrize("model", ["lambert", "lambert+ggx"])
+def test_what_was_not_measured_is_in_the_error(model: str, theta_i: float) -> None:
+    """Azimuths every 10°, sensor up to 55°: two thirds of the projected hemisphere, beside the whole by quadrature."""
+    theta_o, phi = np.deg2rad(np.arange(0, 56, 5.0)), np.deg2rad(np.arange(0, 360, 10.0))
+    lobe: dict[str, Any] = {} if model == "lambert" else {"alpha": 0.4, "eta": 1.5}
+    truth = fm.model(model, kd=0.3, **lobe)
+    (found,) = added(fm.simulate(truth, [theta_i], theta_o, phi=phi, relative_noise=1e-3, absolute_noise=1e-6, seed=1))
+    exact = float(fm.albedo(truth, theta_i).value[0, 0])
+    assert not found.assumed
+    assert found.covered == pytest.approx(np.sin(np.deg2rad(55)) ** 2, rel=0.02)  # a polygon of 36 corners
+    assert abs(found.value[0] - exact) < found.error[0]
+    assert found.error[0] < 0.6 * exact
+    assert found.value[0] - found.error[0] > 0.5 * exact  # what is there is used
 
 
 @pytest.mark.parametrize("theta_i", FOUR)
@@ -336,7 +352,9 @@ def test_prospects_are_the_inverse_of_the_fisher_information() -> None:
         ends = [fm.evaluate(fm.model("lambert+ggx", **truth | {name: value * f}), m.wi, m.wo) for f in (1.001, 0.999)]
         slopes.append((ends[0] - ends[1])[:, 0] / 0.002 / np.hypot(1e-3, 0.02 * exact))
     expected = np.sqrt(np.diagonal(np.linalg.inv(np.array(slopes) @ np.array(slopes).T)))
-    found = [p for p in prospects(m, m.sigma, known=True) if (p.model, p.gloss) == ("lambert+ggx", "satin")]
+    found = [
+        p for p in prospects(m, channel_laws(m, measured_noise(m))) if (p.model, p.gloss) == ("lambert+ggx", "satin")
+    ]
     assert [p.name for p in found] == list(truth)
     assert [p.sd for p in found] == pytest.approx(expected, rel=1e-2)  # the law of σ is estimated from the file
     assert {p.verdict for p in found} == {"determined"}

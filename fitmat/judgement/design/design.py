@@ -18,7 +18,7 @@ from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
 from fitmat.judgement.design.candidates import Candidates, Limits, Measured, proposed
 from fitmat.judgement.design.filters import Bank, Task, bank, scores
-from fitmat.measurements.noise import noise_law
+from fitmat.measurements.noise import channel_laws
 from fitmat.uncertainty.posterior import Posterior
 
 APART = 4.9
@@ -176,10 +176,7 @@ def _wanted(fit: Fit, target: str | None) -> tuple[int, ...]:
 
 def _law(fit: Fit) -> Float[np.ndarray, "2 c"]:
     """a and b of every channel."""
-    m, sigma = fit.measurements, fit.noise.sigma
-    used = [m.valid[:, k] for k in range(len(m.channels))]
-    laws = [noise_law(m.value[u, k], sigma[u, k]) if u.any() else (1.0, 0.0) for k, u in enumerate(used)]
-    return np.array(laws).T
+    return np.array([law or (1.0, 0.0) for law in channel_laws(fit.measurements, fit.noise)]).T
 
 
 def _proposal(looked: Candidates, best: int, repeats: int, gain: float, sd_if: np.ndarray) -> Proposal:

@@ -18,7 +18,7 @@ from fitmat.judgement.examination.implied_albedo import ImpliedAlbedo, implied_a
 from fitmat.judgement.examination.phrases import Said
 from fitmat.judgement.examination.prospects import ASSUMED, Prospect, prospects
 from fitmat.judgement.examination.value_range import ValueRange, value_range
-from fitmat.measurements.noise import Noise, measured_noise, noise_law
+from fitmat.measurements.noise import Noise, channel_laws, measured_noise
 from fitmat.measurements.samples import Measurements
 from fitmat.text import plain
 
@@ -155,7 +155,23 @@ def examine(measurements: Measurements) -> Examination:
         >>> import fitmat as fm, numpy as np
         >>> print(examine(fm.from_arrays(np.full(3, 0.5), [-0.5, 0.0, 0.5], [0.1, 0.1, 0.3])))  # doctest: +SKIP
     """
-    m = measurements
+    looked = _looked(measurements)
+    return dataclasses.replace(looked, prospects=prospects(measurements, looked.noise))
+
+
+def warnings(measurements: Measurements, *, tilted: bool = False) -> tuple[str, ...]:
+    """What the owner of a file should look into before believing a fit to it: those of `examine`, as sentences.
+
+    Args:
+        measurements: From `fitmat.read`.
+        tilted: Whether a lean of the sample is fitted, so that there is no need to speak of it.
+    """
+    looked = _looked(measurements)
+    return tuple(dataclasses.replace(looked, tilt=None if tilted else looked.tilt).warnings)
+
+
+def _looked(m: Measurements) -> Examination:
+    """Everything but the prospects."""
     where = coverage(m)
     noise = _noise(m)
     agreement = consistency(m, noise.sigma, mirror_frame(m.wi, m.wo), known=noise.known, step=_step(where))
@@ -163,7 +179,7 @@ def examine(measurements: Measurements) -> Examination:
     every = np.arange(len(m.channels))[:: -(-len(m.channels) * max(len(where.incidences), 1) // MOST_CURVES)]
     curves = [(incidence, int(k)) for incidence in where.incidences for k in every if not where.scattered]
     peaks = [p for curve in curves if (p := peak(m, noise.sigma, *curve)) is not None]
-    laws = tuple(_law(m, noise, k) for k in range(len(m.channels)))
+    laws = tuple(channel_laws(m, noise)) if noise.known else (None,) * len(m.channels)
     return Examination(
         measurements=m,
         sigma=noise.sigma,
@@ -176,7 +192,7 @@ def examine(measurements: Measurements) -> Examination:
         peaks=tuple(peaks),
         levels=tuple(v for curve in curves if (v := level(m, noise.sigma, *curve)) is not None),
         tilt=tilt(peaks),
-        prospects=prospects(m, noise.sigma, known=noise.known),
+        prospects=(),
     )
 
 
@@ -197,12 +213,6 @@ def _noise(m: Measurements) -> Noise:
         because = "Noise unknown: not given, and not estimated in a file as large as this."
     relative, absolute = ASSUMED
     return Noise(np.hypot(absolute, relative * np.abs(m.value)), False, because)
-
-
-def _law(m: Measurements, noise: Noise, k: int) -> tuple[float, float] | None:
-    """a and b of σ² = a² + (b f)² of one channel; None where not known."""
-    rows = np.flatnonzero(m.valid[:, k])
-    return noise_law(m.value[rows, k], noise.sigma[rows, k]) if noise.known and len(rows) else None
 
 
 def _geometry(where: Coverage) -> dict[str, Any]:

@@ -37,10 +37,13 @@ def albedos(found: Sequence[ImpliedAlbedo], channels: Sequence[str]) -> Said:
     listed = "; ".join(f"{_albedo(a)} at {say.degrees(a.theta_i)}" for a in found)
     share = say.span([a.covered for a in found], say.percent)
     assumed = [a for a in found if a.assumed]
-    how = f", from {share} of the hemisphere (projected), the rest taken as dark"
+    which = "" if len(assumed) == len(found) else f" at {', '.join(say.degrees(a.theta_i) for a in assumed)}"
+    how = f", from {share} of the hemisphere (projected)"
     if assumed:
-        which = "" if len(assumed) == len(found) else f" at {', '.join(say.degrees(a.theta_i) for a in assumed)}"
-        how += f"; the lobe is taken to be round about the mirror direction{which}, since one plane shows no more"
+        how += f"; the lobe is taken to be round about the mirror direction{which}, since one plane shows no more, and "
+        how += "the rest as dark"
+    if len(assumed) < len(found):
+        how += "; what lies beyond all samples is taken to be as bright as the nearest, and lies in the ± as a whole"
     said.lines.append(f"Implied albedo: {listed}{how}.")
     return said
 

@@ -1,19 +1,25 @@
 """Implied albedo: the fraction of the light that the measured values themselves add up to, without any model.
 
-It fills no gap wider than what lies between neighbouring samples; what was not measured counts as dark.
+What it takes of directions beyond all samples is in the error as a whole.
 """
 
 import dataclasses
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from fitmat.judgement.examination.coverage import Incidence
 from fitmat.measurements.samples import IN_PLANE, Measurements
 
-ENOUGH = 0.8
+AZIMUTHS = 3
+"""Of samples at fewer relative azimuths, left and right taken as alike, the curve in the plane tells more."""
+
+ENOUGH = 0.3
 """Share of the projected hemisphere between samples from which they are added up without an assumption."""
+
+OUTSIDE = 2000
+"""Directions, even in projected solid angle, at which the part of the hemisphere beyond all samples is looked at."""
 
 FEWEST = 5
 """A curve of fewer samples is not added up."""
@@ -32,13 +38,15 @@ class Rule(NamedTuple):
         corners: Samples between which each node lies, (q, k).
         shares: Their barycentric weights, (q, k).
         weight: Projected solid angle of each node, (q,).
-        covered: Sum of the weights over π, the whole projected hemisphere.
+        covered: Share of the whole projected hemisphere that lies between samples.
+        beyond: Which nodes lie beyond all samples and have the value of the nearest, (q,).
     """
 
     corners: Int[np.ndarray, "q k"]
     shares: Float[np.ndarray, "q k"]
     weight: Float[np.ndarray, " q"]
     covered: float
+    beyond: Bool[np.ndarray, " q"]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -48,9 +56,10 @@ class ImpliedAlbedo:
     Attributes:
         theta_i: Incidence, radians.
         value: Per channel, (c,); NaN where a channel has too few samples.
-        error: Its uncertainty: the difference of two interpolations, and the noise, (c,).
-        covered: Share of the projected hemisphere that was added up; the rest counts as dark.
-        assumed: Whether the lobe was taken to be round about the mirror direction.
+        error: Its uncertainty: the difference of two interpolations, the noise, and all that is taken of directions
+            beyond the samples, (c,).
+        covered: Share of the projected hemisphere between samples.
+        assumed: Whether the lobe was taken to be round about the mirror direction, and the rest to be dark.
     """
 
     theta_i: float
@@ -68,11 +77,12 @@ class ImpliedAlbedo:
 def implied_albedo(m: Measurements, sigma: Float[np.ndarray, "n c"], incidence: Incidence) -> ImpliedAlbedo | None:
     """Add up the samples of one incidence; None where they are too few to say anything.
 
-    ∫ f cosθ_o dω_o is ∫ f dx dy over the unit disc of (x, y) = sinθ_o (cosφ, sinφ). Where samples surround at least
-    `ENOUGH` of it, f is interpolated over a Delaunay triangulation, left and right taken as alike. Else the in-plane
-    curve is turned about the mirror direction: f depends on the distance from it in (x, y) only (the shift invariance
-    of Harvey 1976, which a microfacet lobe keeps to first order in its width), the mean of the curve's two sides; where
-    one side ends the other stands in for it.
+    ∫ f cosθ_o dω_o is ∫ f dx dy over the unit disc of (x, y) = sinθ_o (cosφ, sinφ). Where samples at `AZIMUTHS` or more
+    surround at least `ENOUGH` of it, f is interpolated over a Delaunay triangulation, left and right taken as alike,
+    and beyond it is that of the nearest sample. Else the in-plane curve is turned about the mirror direction: f depends
+    on the distance from it in (x, y) only (the shift invariance of Harvey 1976, which a microfacet lobe keeps to first
+    order in its width), the mean of the curve's two sides; where one side ends the other stands in for it, and where
+    both have ended nothing is added.
 
     Values are interpolated in asinh(f/median), which is linear for the floor and logarithmic in the peak; the
     distance to linear interpolation is the uncertainty, because the two differ where a lobe is not resolved.
@@ -99,7 +109,7 @@ def implied_albedo(m: Measurements, sigma: Float[np.ndarray, "n c"], incidence: 
 
 def _rule(incidence: Incidence, usable: np.ndarray) -> tuple[Rule, bool] | None:
     local = incidence.wo[usable]
-    full = _triangles(local)
+    full = _triangles(local) if incidence.azimuths >= AZIMUTHS else None
     if full is not None and full.covered >= ENOUGH:
         return full, False
     turned = _turned(local, np.sin(incidence.theta_i))
@@ -110,13 +120,14 @@ def _added(rule: Rule, f: np.ndarray, sigma: np.ndarray) -> tuple[np.ndarray, np
     """The integral and its uncertainty, per channel."""
     scale = np.median(np.abs(f), axis=0)
     scale = np.where(scale > 0, scale, 1.0)
-    value, linear = np.zeros(f.shape[1]), np.zeros(f.shape[1])
+    value, linear, beyond = np.zeros((3, f.shape[1]))
     curved = np.arcsinh(f / scale)
     for k in range(f.shape[1]):
-        value[k] = scale[k] * (rule.weight @ np.sinh((curved[rule.corners, k] * rule.shares).sum(axis=1)))
+        each = scale[k] * rule.weight * np.sinh((curved[rule.corners, k] * rule.shares).sum(axis=1))
+        value[k], beyond[k] = each.sum(), each[rule.beyond].sum()
         linear[k] = rule.weight @ (f[rule.corners, k] * rule.shares).sum(axis=1)
-    each = np.bincount(rule.corners.ravel(), (rule.weight[:, None] * rule.shares).ravel(), minlength=len(f))
-    return value, np.hypot(linear - value, np.sqrt(each**2 @ sigma**2))
+    share = np.bincount(rule.corners.ravel(), (rule.weight[:, None] * rule.shares).ravel(), minlength=len(f))
+    return value, np.sqrt((linear - value) ** 2 + share**2 @ sigma**2 + beyond**2)
 
 
 def _triangles(local: np.ndarray) -> Rule | None:
@@ -128,21 +139,30 @@ def _triangles(local: np.ndarray) -> Rule | None:
         return None
     both = np.concatenate([points, points[aside] * [1.0, -1.0]])
     sample = np.concatenate([first, first[aside]])
-    from scipy.spatial import Delaunay, QhullError
+    from scipy.spatial import Delaunay, KDTree, QhullError
 
     try:
-        corners = Delaunay(both).simplices
+        mesh = Delaunay(both)
     except QhullError:
         return None
-    a, b, c = (both[corners[:, k]] for k in range(3))
+    a, b, c = (both[mesh.simplices[:, k]] for k in range(3))
     area = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2.0
     centres = _centres()
-    nodes = len(centres)
+    inside, count = len(area) * len(centres), np.arange(OUTSIDE) + 0.5
+    disc = np.sqrt(count / OUTSIDE)[:, None] * np.column_stack(
+        [f(np.pi * (1 + 5**0.5) * count) for f in (np.cos, np.sin)]
+    )
+    disc = disc[mesh.find_simplex(disc) < 0]
+    nearest = sample[KDTree(both).query(disc)[1]]
+    rest = max(np.pi - area.sum(), 0.0) / max(len(disc), 1)
     return Rule(
-        np.repeat(sample[corners], nodes, axis=0),
-        np.tile(centres, (len(corners), 1)),
-        np.repeat(area / nodes, nodes),
+        np.concatenate(
+            [np.repeat(sample[mesh.simplices], len(centres), axis=0), np.repeat(nearest[:, None], 3, axis=1)]
+        ),
+        np.concatenate([np.tile(centres, (len(area), 1)), np.tile([1.0, 0.0, 0.0], (len(disc), 1))]),
+        np.concatenate([np.repeat(area / len(centres), len(centres)), np.full(len(disc), rest)]),
         float(area.sum() / np.pi),
+        np.arange(inside + len(disc)) >= inside,
     )
 
 
@@ -183,4 +203,4 @@ def _turned(local: np.ndarray, centre: float) -> Rule | None:
     samples = rows[first]
     corners = np.stack([samples[at - 1], samples[at]], axis=-1).reshape(-1, 2)
     shares = np.stack([1.0 - share, share], axis=-1).reshape(-1, 2)
-    return Rule(corners, shares, weight.ravel(), float(weight.sum() / np.pi))
+    return Rule(corners, shares, weight.ravel(), float(weight.sum() / np.pi), np.zeros(weight.size, bool))

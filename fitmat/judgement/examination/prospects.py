@@ -4,6 +4,7 @@ It looks at no measured value but for the noise; what the sample is, it does not
 """
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import jax
@@ -14,7 +15,6 @@ from jaxtyping import Array, Float
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.information import UNDETERMINED, inverse_information
 from fitmat.maths.programs import program
-from fitmat.measurements.noise import noise_law
 from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.parameters import entries, vector
@@ -67,7 +67,7 @@ class Prospect:
     verdict: str
 
 
-def prospects(m: Measurements, sigma: Float[np.ndarray, "n c"], *, known: bool) -> tuple[Prospect, ...]:
+def prospects(m: Measurements, laws: Sequence[tuple[float, float] | None]) -> tuple[Prospect, ...]:
     """The standard deviations that fits to such a file would have if the sample were one of `GLOSSES`.
 
     From I = Jᵀ Σ⁻¹ J at the true parameters (the Cramér–Rao bound), in natural coordinates, for the channel with most
@@ -75,14 +75,13 @@ def prospects(m: Measurements, sigma: Float[np.ndarray, "n c"], *, known: bool) 
 
     Args:
         m: Gives the directions.
-        sigma: Noise in sr⁻¹, (n, c), of which the law σ² = a² + (b f)² is taken.
-        known: Whether the noise is known; else `ASSUMED`.
+        laws: a (sr⁻¹) and b of the noise σ² = a² + (b f)² per channel; None where it is unknown, for `ASSUMED`.
     """
     channel = int(m.valid.sum(axis=0).argmax())
     rows = np.flatnonzero(m.valid[:, channel])
     if len(rows) == 0:
         return ()
-    absolute, relative = noise_law(m.value[rows, channel], sigma[rows, channel]) if known else ASSUMED[::-1]
+    absolute, relative = laws[channel] or ASSUMED[::-1]
     kept = rows[np.unique(np.linspace(0, len(rows) - 1, ROWS).round().astype(int))]
     blank = ROWS - len(kept)
     wi, wo = (np.concatenate([part[kept], np.tile([0.0, 0.0, 1.0], (blank, 1))]) for part in (m.wi, m.wo))

@@ -10,7 +10,8 @@ from jaxtyping import Float
 
 from fitmat._types import Progress
 from fitmat.measurements.large.stream import Stream
-from fitmat.measurements.noise import Noise, at_level, law, law_words, leave_one_out, measured_noise
+from fitmat.measurements.neighbours import leave_one_out
+from fitmat.measurements.noise import Noise, law, measured_noise, of_laws, seen_levels
 from fitmat.measurements.samples import Measurements
 
 
@@ -23,14 +24,12 @@ class Scatter:
         laws: For each channel, a (sr⁻¹) and b of σ² = a² + (b f)²; NaN where they cannot be estimated.
         tops: The largest value of each channel, sr⁻¹.
         levels: f at the rows of the part as their neighbours say it, (n, c).
-        words: One sentence for the report.
     """
 
     given: bool
     laws: Float[np.ndarray, "c 2"]
     tops: Float[np.ndarray, " c"]
     levels: Float[np.ndarray, "n c"]
-    words: str
 
     def of(self, chunk: Measurements) -> Noise:
         """σ of a chunk's rows."""
@@ -44,12 +43,7 @@ class Scatter:
         """σ of rows whose f as their neighbours say it is known, (n, c)."""
         if self.given:
             return measured_noise(m)
-        sigma = at_level(self.laws, _smoothed(m, levels), self.tops)
-        return Noise(sigma, bool(np.isfinite(self.laws).all()), self.words)
-
-
-def _smoothed(m: Measurements, level: np.ndarray) -> np.ndarray:
-    return np.where(np.isfinite(level), np.abs(level), np.abs(m.value))
+        return of_laws(self.laws, seen_levels(m, levels), self.tops, m.channels)
 
 
 def scatter(chunks: Stream, progress: Progress | None = None, seen: list[np.ndarray] | None = None) -> Scatter:
@@ -69,7 +63,7 @@ def scatter(chunks: Stream, progress: Progress | None = None, seen: list[np.ndar
         none = np.full((count, 2), np.nan)
         if seen is not None:
             seen.extend(np.zeros(0) for _ in chunks)
-        return Scatter(True, none, none[:, 0], np.full(part.value.shape, np.nan), "")
+        return Scatter(True, none, none[:, 0], np.full(part.value.shape, np.nan))
     found, tops, done = [], np.zeros(count), 0
     for chunk in chunks:
         kept = chunks.in_part(done, chunk.n_samples)
@@ -81,7 +75,6 @@ def scatter(chunks: Stream, progress: Progress | None = None, seen: list[np.ndar
         done += chunk.n_samples
         if progress is not None:
             progress("noise", done, chunks.n_samples)
-    levels, errors, factors = np.concatenate(found, axis=1)
-    smooth = _smoothed(part, levels)
-    laws = np.stack([law(errors[:, k], smooth[:, k], factors[:, k], tops[k], len(errors)) for k in range(count)])
-    return Scatter(False, laws, tops, levels, law_words(laws, part.channels))
+    compared = np.concatenate(found, axis=1)
+    laws = np.stack([law(compared[:, :, k], part.value[part.valid[:, k], k]) for k in range(count)])
+    return Scatter(False, laws, tops, compared[0])
