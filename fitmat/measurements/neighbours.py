@@ -51,7 +51,7 @@ def leave_one_out(m: Measurements) -> Float[np.ndarray, "3 n c"]:
     The level comes from two neighbours on either side by cubic interpolation in asinh(f/median), which is linear for
     the floor and logarithmic in the peak; at the end of a curve from those that are nearest. The error is that of
     repeats and of the cubic, NaN where there are neither, or where the neighbours differ so much in one rise and fall
-    that the cubic's own error is no noise. The level is NaN where a curve has a single value.
+    that the cubic's own error is no noise. The level is NaN where a curve has too few values to be one.
     """
     found = np.full((3, *m.value.shape), np.nan)
     same: dict[bytes, list[int]] = {}  # channels that are valid in the same rows have the same curves
@@ -118,7 +118,8 @@ def _nearest(y: Float[np.ndarray, "n c"], curve: np.ndarray, x: np.ndarray) -> F
     gap = np.where(other == one, np.inf, x[other] - x[one])
     step = (y[other] - y[one]) * ((x - x[one]) / gap)[:, None]
     most = np.where(between, np.inf, np.log(_STEEP) / 2)[:, None]
-    return np.where((before | after)[:, None], y[one] + np.clip(step, -most, most), np.nan)
+    curved = np.bincount(curve, minlength=1)[curve] > len(_NEAR)
+    return np.where(curved[:, None], y[one] + np.clip(step, -most, most), np.nan)
 
 
 def _lagrange(nodes: np.ndarray, at: np.ndarray) -> np.ndarray:
