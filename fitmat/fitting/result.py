@@ -139,6 +139,8 @@ class Fit:
             return "cannot be judged: nothing finite was found"
         if not self.noise.known:
             return "adequacy unknown: the noise is not known"
+        if self.n_values > 1 and np.ptp(self.measurements.value[self.measurements.valid]) == 0:
+            return "adequacy unknown: all values are identical"
         if ratio < FOLLOWS:
             return "follows the data within the measurement noise"
         if ratio < MISSES:

@@ -23,6 +23,9 @@ AZIMUTHS = 4
 COARSE = (24, 12)
 """Nodes behind the spread of the draws; the best fits are integrated with all nodes."""
 
+WITHIN = np.deg2rad(2.5)
+"""An incidence so near to one that was measured is not beyond it."""
+
 ANGLES = np.deg2rad(np.arange(0.0, 86.0, 5.0))
 """Incidence angles of all curves against incidence, radians."""
 
@@ -35,6 +38,7 @@ class Distances:
         theta_i: Incidence of the curves, radians, (k,).
         whole: Metric → distance over all pairs of directions.
         measured: The relative distance over the incidence angles of the measurements.
+        beyond: Fraction of the whole relative difference T that lies at incidences smaller or larger than all of these.
         by_region: Metric → region → distance over the region's pairs; for "albedo" the region's part of the whole.
         share: Metric → region → fraction of the whole difference T that lies there.
         by_incidence: Metric → distance at each incidence, rows low, best, high, (3, k); NaN where it has no pairs.
@@ -46,6 +50,7 @@ class Distances:
     theta_i: Float[np.ndarray, " k"]
     whole: dict[str, Estimate]
     measured: Estimate
+    beyond: float
     by_region: dict[str, dict[str, Estimate]]
     share: dict[str, dict[str, Estimate]]
     by_incidence: dict[str, Float[np.ndarray, "3 k"]]
@@ -95,6 +100,7 @@ def measure_distances(
         theta_i=ANGLES,
         whole=result["whole"],
         measured=estimate(_over_nodes(METRICS["relative"], t, b)),
+        beyond=_beyond(top[0, over, place].sum(axis=1) * solid * np.cos(theta), theta, measured),
         by_region=result["by_region"],
         share=result["share"],
         by_incidence=result["by_incidence"],
@@ -102,6 +108,12 @@ def measure_distances(
         grazing_excess=estimate(light[0] / np.maximum(light[1], 1e-300) - 1.0),
         albedos=albedos[:, curves].transpose(2, 0, 1),
     )
+
+
+def _beyond(parts: np.ndarray, theta: np.ndarray, measured: np.ndarray) -> float:
+    """Fraction of parts at incidences `theta` that lie outside the range of those measured."""
+    outside = (theta < measured.min() - WITHIN) | (theta > measured.max() + WITHIN)
+    return float(parts[outside].sum() / max(parts.sum(), 1e-300))
 
 
 def incidence_weight(metric: Metric, theta: np.ndarray, solid: np.ndarray) -> np.ndarray:

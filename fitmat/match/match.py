@@ -106,7 +106,7 @@ class Match:
         """The match in plain sentences; thresholds: `sentences`, `discernibility`, `ablation`, `spheres`."""
         names = _lobe_title(self.empirical.fit.name), _lobe_title(self.microfacet.fit.name)
         found = [
-            sentences.distance_sentence(names, self.hemisphere_distance),
+            sentences.distance_sentence(names, self.measured_distance, self.hemisphere_distance, self.distances.beyond),
             sentences.telling_sentence(names, self.telling),
             sentences.grazing_sentence(names, self.distances.grazing_excess, self.ablation),
             sentences.gap_sentence(names, self.albedo_gap_max, self.albedo_gap_sign, self.albedo_gap_theta_i_deg),

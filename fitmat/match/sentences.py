@@ -3,6 +3,7 @@
 It measures nothing and decides nothing that a named threshold does not.
 """
 
+import bisect
 import math
 
 from fitmat.match.ablation import TERMS, Ablation
@@ -11,7 +12,7 @@ from fitmat.match.regions import GRAZING_DEG
 from fitmat.uncertainty.estimate import Estimate
 
 CLOSE, SIMILAR = 0.1, 0.3
-"""Hemisphere distances up to which the verdict says "hardly differ" and "differ moderately"."""
+"""Distances up to which the verdict says "hardly differ" and "differ moderately"."""
 
 STRONG_EVIDENCE = 10.0
 """ΔBIC from which the data clearly prefer one model (Kass & Raftery 1995: "very strong")."""
@@ -23,13 +24,33 @@ Names = tuple[str, str]
 """Of the empirical and the microfacet lobe."""
 
 
-def distance_sentence(names: Names, distance: Estimate) -> str:
-    """How far apart the two are over the hemisphere."""
-    highest = distance.ci95[1]
-    words = "hardly differ" if highest < CLOSE else "differ moderately" if highest < SIMILAR else "differ strongly"
-    apart = f"{names[0]} and {names[1]} {words}: {100 * distance.value:.0f} % apart over the hemisphere"
+def distance_sentence(names: Names, measured: Estimate, whole: Estimate, beyond: float) -> str:
+    """How far apart the two are where they were measured, and over the hemisphere.
+
+    Args:
+        names: Of the two.
+        measured: Relative distance at the incidences measured.
+        whole: The same over the hemisphere.
+        beyond: Fraction of the whole that lies at incidences beyond those measured.
+    """
+    over = f"Over the whole hemisphere it is {_percent(whole)}"
+    rests = f", of which {100 * beyond:.0f} % rests on incidences beyond those measured" if beyond >= MENTIONED else ""
+    apart = _percent(measured, "apart at the incidences measured")
+    return f"{' and '.join(names)} {_differ(measured)}: {apart}. {over}{rests}."
+
+
+def _differ(distance: Estimate) -> str:
+    """What the interval, or without one the value, is called; from one word to another where it holds several."""
+    ends = distance.ci95 if distance.has_interval else (distance.value, distance.value)
+    low, high = (bisect.bisect_right((CLOSE, SIMILAR), end) for end in ends)
+    words = ("hardly differ", "differ moderately", "differ strongly")
+    return words[low] if low == high else f"{words[low]} or {words[high]}, which the data leave open"
+
+
+def _percent(distance: Estimate, apart: str = "") -> str:
     low, high = (100 * x for x in distance.ci95)
-    return f"{apart} (95 % interval {low:.0f}–{high:.0f} %)." if distance.has_interval else f"{apart}."
+    words = f"{100 * distance.value:.0f} %{f' {apart}' if apart else ''}"
+    return f"{words} (95 % interval {low:.0f}–{high:.0f} %)" if distance.has_interval else words
 
 
 def telling_sentence(names: Names, telling: Telling) -> str | None:

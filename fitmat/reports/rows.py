@@ -9,6 +9,7 @@ import numpy as np
 
 from fitmat.studies.findings import Findings
 from fitmat.text import interval, with_error
+from fitmat.uncertainty.quantities import UNDETERMINED
 
 
 def parameter_rows(found: Findings) -> list[dict[str, str]]:
@@ -24,7 +25,7 @@ def parameter_rows(found: Findings) -> list[dict[str, str]]:
                 low, high = q.ci95[k]
                 channel = f" {channels[k]}" if q.per_channel and len(channels) > 1 else ""
                 free = q.remark != "fixed" and np.isfinite(low) and np.isfinite(high)
-                sd = math.nan if q.remark.startswith("not determined") else q.sd[k]
+                sd = math.nan if q.remark == UNDETERMINED else q.sd[k]
                 result.append(
                     {
                         "kind": kind,

@@ -14,7 +14,6 @@ from fitmat.fitting.result import RESULTS
 from fitmat.reports.rows import parameter_rows
 from fitmat.studies.findings import Findings
 from fitmat.studies.study import MOST_SAMPLED, Study
-from fitmat.uncertainty.posterior import Posterior
 
 
 def _say(out: Console, words: str, **how: Any) -> None:
@@ -43,7 +42,7 @@ def show(found: Study, folder: Path, screen: Console | None = None) -> None:
         _say(out, f"The loss {first.loss.name} is an objective: single fits, without a posterior.")
     shown = found.detailed
     for one in shown:
-        _say(out, f"\n[bold]{_title(one.posterior)}[/bold]")
+        _say(out, f"\n[bold]{_title(one)}[/bold]")
         out.print(_table(one))
         _remark(out, one)
     _say(out, "\n→ follows from the parameters above it", style="dim")
@@ -65,17 +64,18 @@ def _remark(out: Console, found: Findings) -> None:
     if found.posterior.interrupted:
         _say(out, "[yellow]interrupted[/yellow]: sampling was stopped; what was done is kept.")
     if against.words:
-        _say(out, f"[yellow]{'inadequate' if against.inadequate else 'note'}[/yellow]: {against}")
+        _say(out, f"[yellow]{'in doubt' if against.inadequate else 'note'}[/yellow]: {against}")
     for said in (found.identifiability, found.second_opinion):
         if said is not None:
             _say(out, said.words, markup=False)
 
 
-def _title(posterior: Posterior) -> str:
-    fit = posterior.fit
+def _title(found: Findings) -> str:
+    posterior, fit = found.posterior, found.fit
     agreeing = f"{fit.n_starts_agreeing} of {fit.n_starts} starts agree"
     ending = f"posterior {posterior.verdict}" if fit.loss.posterior else f"loss {fit.loss.name}, no posterior"
-    return f"{fit.name}: {fit.result}, {agreeing}, {ending}"
+    against = ", intervals in doubt" if found.doubts.inadequate else ""
+    return f"{fit.name}: {fit.result}, {agreeing}, {ending}{against}"
 
 
 def _table(found: Findings) -> Table:

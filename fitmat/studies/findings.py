@@ -82,15 +82,22 @@ class Findings:
         return self.posterior.fit.name
 
 
-def find(posterior: Posterior, along: Sequence[Section]) -> Findings:
+def find(
+    posterior: Posterior,
+    along: Sequence[Section],
+    identifiability: Identifiability | None = None,
+    check: PredictiveCheck | None = None,
+) -> Findings:
     """What a posterior says of its model.
 
     Args:
         posterior: By `sample` or `laplace`.
         along: Sections of the measurements, along which the model is drawn.
+        identifiability: What the angles determine, where that was asked; what they leave open is called so everywhere.
+        check: Whether the model can make such data, where that was asked.
     """
     fit = posterior.fit
-    fitted = parameters(posterior)
+    fitted = parameters(posterior, () if identifiability is None else identifiability.undetermined)
     return Findings(
         posterior=posterior,
         parameters=tuple(fitted),
@@ -101,6 +108,8 @@ def find(posterior: Posterior, along: Sequence[Section]) -> Findings:
         learnt=_learnt(posterior),
         curves=predict_curves(posterior, along),
         residuals=standardised_residuals(fit),
+        identifiability=identifiability,
+        check=check,
     )
 
 

@@ -15,7 +15,7 @@ from fitmat.studies.findings import Findings
 from fitmat.studies.study import Study
 from fitmat.text import plain
 from fitmat.uncertainty.estimate import Estimate
-from fitmat.uncertainty.quantities import Quantity
+from fitmat.uncertainty.quantities import UNDETERMINED, Quantity
 
 
 def to_dict(study: Study) -> dict[str, Any]:
@@ -55,7 +55,7 @@ def _fit_dict(found: Findings) -> dict[str, Any]:
         "adequacy": fit.adequacy,
         "doubts": list(found.doubts.words),
         "intervals_hold": not found.doubts.inadequate,
-        "not_determined": list(fit.undetermined),
+        "not_determined": [q.name for q in found.parameters if q.remark == UNDETERMINED],
         "n_starts": fit.n_starts,
         "n_starts_agreeing": fit.n_starts_agreeing,
         "steps": fit.steps,

@@ -19,9 +19,9 @@ from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.streamed import fit_from, fit_part, rows
 from fitmat.judgement.choice import Choice, choose
 from fitmat.judgement.examination.examining import warnings
-from fitmat.judgement.identifiability.verdicts import identify
+from fitmat.judgement.identifiability.verdicts import Identifiability, identify
 from fitmat.judgement.prediction import sections
-from fitmat.judgement.predictive_check import check_predictions
+from fitmat.judgement.predictive_check import PredictiveCheck, check_predictions
 from fitmat.match.match import Match, compare, is_empirical, is_microfacet
 from fitmat.measurements.large.stream import Stream, hold
 from fitmat.measurements.samples import Measurements
@@ -239,8 +239,7 @@ def judge(
     say(words, 0, count)
 
     def looked(posterior: Posterior) -> Findings:
-        found = find(posterior, along)
-        return _examined(found, seed) if posterior in looked_at else found
+        return find(posterior, along, *(_examined(posterior, seed) if posterior in looked_at else ()))
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for found in pool.map(looked, posteriors):
@@ -259,11 +258,9 @@ def _odd(posteriors: Sequence[Posterior]) -> tuple[str, ...]:
     return warnings(fit.measurements, tilted=any(Tilted.prefix in posterior.fit.name for posterior in posteriors))
 
 
-def _examined(found: Findings, seed: int) -> Findings:
-    """With what is asked of a few models only."""
-    posterior = found.posterior
-    check = None if posterior.fit.loss.robust else check_predictions(posterior, seed=seed)
-    return dataclasses.replace(found, identifiability=identify(posterior), check=check)
+def _examined(posterior: Posterior, seed: int) -> tuple[Identifiability, PredictiveCheck | None]:
+    """What is asked of a few models only."""
+    return identify(posterior), None if posterior.fit.loss.robust else check_predictions(posterior, seed=seed)
 
 
 def _asked_again(found: Findings, seed: int, say: Progress) -> Findings:

@@ -20,6 +20,7 @@ from fitmat.fitting.result import Fit
 from fitmat.maths import normal
 from fitmat.models.parameters import Entry
 from fitmat.text import html_table, text_table, with_error
+from fitmat.uncertainty.estimate import limits
 
 VERDICTS = {
     "reliable": "The walks are long enough and agree with each other.",
@@ -150,8 +151,8 @@ class Posterior:
         return self.values.std(axis=0)
 
     def interval(self, level: float = 0.95) -> Float[np.ndarray, "p 2"]:
-        """Central credible interval of each parameter."""
-        return np.quantile(self.values, [(1 - level) / 2, (1 + level) / 2], axis=0).T
+        """Interval of each parameter that holds the posterior with a probability, by `estimate.limits`."""
+        return limits(self.fit.values, self.values, level).T
 
     def thinned(self, count: int) -> tuple[Float[np.ndarray, "k p"], Float[np.ndarray, " k"]]:
         """At most `count` draws spread evenly over the run: parameter vectors and discrepancies."""

@@ -4,16 +4,20 @@ Takes all numbers from a posterior; formats nothing.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
 from fitmat.fitting.coordinates import coordinates
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
 from fitmat.models.terms.fresnel import eta_from_f0, f0_from_eta
+from fitmat.uncertainty.estimate import limits
 from fitmat.uncertainty.posterior import Posterior
 
 Z95 = 1.959964
+
+UNDETERMINED = "not determined by these angles"
+"""Remark on what has an interval but no value to rely on."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -43,13 +47,18 @@ class Quantity:
     remark: str
 
 
-def parameters(posterior: Posterior) -> list[Quantity]:
+def parameters(posterior: Posterior, undetermined: Collection[str] = ()) -> list[Quantity]:
     """The model's parameters, then the discrepancy s where the loss infers it; an objective gives values only.
 
-    Value: the best fit. Intervals: quantiles of the draws where these follow the posterior itself; otherwise Laplace,
-    computed in the logarithm for parameters whose scale is log.
+    Value: the best fit. Intervals: `estimate.limits` of the draws where these follow the posterior itself; otherwise
+    Laplace, computed in the logarithm for parameters whose scale is log.
+
+    Args:
+        posterior: Of the fit.
+        undetermined: Names of parameters that are not determined beside those of the fit.
     """
     fit = posterior.fit
+    lost = {*fit.undetermined, *undetermined}
     sampled = posterior.exact
     sd = posterior.sd() if sampled else np.sqrt(np.diagonal(fit.covariance))
     if not fit.loss.posterior:
@@ -61,8 +70,8 @@ def parameters(posterior: Posterior) -> list[Quantity]:
     for entry in fit.entries:
         held, p = entry.name in fit.held, entry.param
         remark = "fixed" if held else ""
-        if entry.name in fit.undetermined:
-            remark = "not determined by these angles"
+        if entry.name in lost:
+            remark = UNDETERMINED
         elif entry.name in fit.on_bound:
             remark = f"at its {fit.on_bound[entry.name]} bound"
         given = np.full(entry.size, np.nan) if held else sure[entry.place]
@@ -79,10 +88,10 @@ def parameters(posterior: Posterior) -> list[Quantity]:
 def _discrepancy(posterior: Posterior) -> Quantity:
     """s; where the best fit has none, its interval is one-sided."""
     best, draws = posterior.fit.discrepancy, posterior.discrepancy
-    limits = np.quantile(draws, [0.025, 0.975]) if best > 0 else np.array([0.0, np.quantile(draws, 0.95)])
+    ends = limits(best, draws) if best > 0 else np.array([0.0, np.quantile(draws, 0.95)])
     words = "spread of ∛(f cosθ_i) that the model cannot explain"
     return Quantity(
-        *("discrepancy", "s", "sr^(-1/3)", words, np.array([best]), np.array([draws.std()]), limits[None]),
+        *("discrepancy", "s", "sr^(-1/3)", words, np.array([best]), np.array([draws.std()]), ends[None]),
         per_channel=False,
         remark="",
     )
@@ -138,7 +147,7 @@ def _from_draws(
 ) -> Quantity:
     name, symbol, doc, draws, source = item
     origin = next(q for q in fitted if q.name == source)
-    ci95 = np.quantile(draws[1:], [0.025, 0.975], axis=0).T
+    ci95 = limits(draws[0], draws[1:]).T
     if not posterior.fit.loss.posterior:
         ci95 = np.full_like(ci95, np.nan)
     sd = np.where(np.isfinite(origin.sd), draws[1:].std(axis=0), np.nan)

@@ -154,13 +154,29 @@ def test_evidence_is_the_difference_of_criteria(fits: tuple[Fit, Fit], match: Ma
 @pytest.mark.parametrize(
     ("ci95", "words"),
     [
-        ((0.04, 0.09), "blinn-phong and ggx hardly differ: 8 % apart over the hemisphere (95 % interval 4–9 %)."),
-        ((0.04, 0.25), "blinn-phong and ggx differ moderately: 8 % apart"),
-        ((0.04, 0.31), "blinn-phong and ggx differ strongly: 8 % apart"),
+        ((0.04, 0.09), "hardly differ: 8 % apart at the incidences measured (95 % interval 4–9 %)."),
+        ((0.12, 0.25), "differ moderately: 8 % apart"),
+        ((0.3, 0.31), "differ strongly: 8 % apart"),
+        ((0.04, 0.25), "hardly differ or differ moderately, which the data leave open: 8 % apart"),
+        ((0.04, 0.31), "hardly differ or differ strongly, which the data leave open: 8 % apart"),
     ],
 )
-def test_the_verdict_names_the_distance(match: Match, ci95: tuple[float, float], words: str) -> None:
-    assert dataclasses.replace(match, hemisphere_distance=Estimate(0.08, ci95)).verdict.startswith(words)
+def test_the_verdict_names_the_measured_distance_first(match: Match, ci95: tuple[float, float], words: str) -> None:
+    verdict = dataclasses.replace(match, measured_distance=Estimate(0.08, ci95)).verdict
+    assert verdict.startswith(f"blinn-phong and ggx {words}")
+
+
+@pytest.mark.parametrize(
+    ("beyond", "words"),
+    [(0.972, "is 20 % (95 % interval 10–30 %), of which 97 % rests on incidences beyond those measured."), (0.02, ".")],
+)
+def test_the_verdict_says_how_much_rests_on_what_nobody_measured(match: Match, beyond: float, words: str) -> None:
+    distances = dataclasses.replace(match.distances, beyond=beyond)
+    changed = dataclasses.replace(match, hemisphere_distance=Estimate(0.2, (0.1, 0.3)), distances=distances)
+    assert (
+        f"Over the whole hemisphere it {words if beyond > 0.5 else 'is 20 % (95 % interval 10–30 %).'}"
+        in changed.verdict
+    )
 
 
 @pytest.mark.parametrize(

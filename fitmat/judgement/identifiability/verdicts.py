@@ -4,6 +4,7 @@ It fits no other model and proposes no measurement; `design` does.
 """
 
 import dataclasses
+import math
 
 import numpy as np
 from jaxtyping import Float
@@ -61,6 +62,11 @@ class Verdict:
     open: tuple[bool, bool]
     contraction: float
 
+    @property
+    def narrower(self) -> float:
+        """Prior over posterior standard deviation."""
+        return 1.0 / math.sqrt(max(1.0 - self.contraction, 1e-300))
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Identifiability:
@@ -89,6 +95,12 @@ class Identifiability:
         if not found:
             raise KeyError(name)
         return max(found, key=STATES.index)
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Names of parameters that these angles do not determine, in one channel at least."""
+        lost = {name for v in self.verdicts if v.state == STATES[2] for name in (v.name, v.name.rpartition(" ")[0])}
+        return tuple(entry.name for entry in self.fit.entries if entry.name in lost)
 
     @property
     def words(self) -> str:
@@ -122,7 +134,7 @@ class Identifiability:
 
     def _rows(self) -> list[tuple[str, ...]]:
         return [
-            (v.name, v.state, f"{v.value:.4g}", " – ".join(f"{x:.4g}" for x in v.ci95), f"{v.contraction:.3f}")
+            (v.name, v.state, f"{v.value:.4g}", " – ".join(f"{x:.4g}" for x in v.ci95), f"{v.narrower:.3g} ×")
             for v in self.verdicts
         ]
 
@@ -132,15 +144,15 @@ class Identifiability:
         return text_table(caption, self._rows()) if self.verdicts else caption
 
     def _repr_html_(self) -> str:
-        headings = ("parameter", "state", "value", "95 % (profile)", "contraction")
+        headings = ("parameter", "state", "value", "95 % (profile)", "narrower than before")
         return html_table(f"{self.fit.name}: {self.words}", headings, self._rows())
 
 
 def identify(posterior: Posterior) -> Identifiability:
     """Say which parameters the data determine.
 
-    A parameter is not determined where its profile likelihood leaves it more room than `UNDETERMINED` or than
-    `CONTRACTED` of its prior, or where its posterior is not narrower than that; else weakly where it is known to no
+    A parameter is not determined where the fit says so, its profile likelihood leaves it more room than `UNDETERMINED`
+    or than `CONTRACTED` of its prior, or its posterior is not narrower than that; else weakly where it is known to no
     better than a tenth. Draws are those of the chain where it is usable, else those of the `ridge`: Laplace's would
     leave a bent ridge, and a chain that did not mix has not seen all of it.
 
@@ -174,7 +186,9 @@ def _verdict(fit: Fit, profile: Profile, contraction: float, prior: float) -> Ve
     log, span = entry.param.scale == "log", entry.param.upper - entry.param.lower
     value = float(fit.values[k])
     low, high = (float(np.exp(x)) if log else float(x) for x in profile.interval)
-    lost = profile.sd > (UNDETERMINED["log"] if log else UNDETERMINED["linear"] * span)
+    lost = entry.name in fit.undetermined or profile.sd > (
+        UNDETERMINED["log"] if log else UNDETERMINED["linear"] * span
+    )
     lost = lost or min(contraction, 1.0 - (profile.sd / prior) ** 2) < CONTRACTED
     if log or entry.param.weight:
         weak = profile.sd / (1.0 if log else max(abs(value), SMALL_WEIGHT * span)) > WEAK

@@ -1,0 +1,134 @@
+"""What a study says agrees with itself: points lie in their intervals, and no two sentences contradict."""
+
+import dataclasses
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fitmat as fm
+from fitmat.reports.rows import parameter_rows
+from fitmat.studies import record
+from fitmat.studies.study import Study, study
+from fitmat.uncertainty.estimate import Estimate
+from fitmat.uncertainty.quantities import UNDETERMINED
+
+ROUNDING = 1e-9
+"""Of quantiles."""
+
+PAIR = "lambert+blinn-phong,lambert+ggx"
+
+
+def estimates(thing: Any, place: str = "") -> Iterator[tuple[str, Estimate]]:
+    """Every `Estimate` inside a dataclass, a dict or a tuple, but for posteriors."""
+    if isinstance(thing, Estimate):
+        yield place, thing
+    elif isinstance(thing, dict):
+        for key, part in thing.items():
+            yield from estimates(part, f"{place}.{key}")
+    elif isinstance(thing, tuple):
+        for k, part in enumerate(thing):
+            yield from estimates(part, f"{place}[{k}]")
+    elif dataclasses.is_dataclass(thing) and not isinstance(thing, fm.Posterior | type):
+        for field in dataclasses.fields(thing):
+            yield from estimates(getattr(thing, field.name), f"{place}.{field.name}")
+
+
+def contradictions(found: Study) -> list[str]:
+    """Every point outside its interval and every pair of statements that do not go together."""
+    return [*_points(found), *_states(found), *_sentences(found)]
+
+
+def _points(found: Study) -> Iterator[str]:
+    for one in found.findings:
+        for q in (*one.parameters, *one.derived):
+            for value, (low, high) in zip(q.value, q.ci95, strict=True):
+                slack, none = ROUNDING * max(abs(value), 1.0), np.isnan(low) and np.isnan(high) and q.remark != ""
+                if q.remark != "fixed" and not none and not low - slack <= value <= high + slack:
+                    yield f"{one.name} {q.name}: {value} outside {low} – {high}"
+    for place, e in estimates(found.match):
+        if e.has_interval and not e.ci95[0] - ROUNDING <= e.value <= e.ci95[1] + ROUNDING:
+            yield f"match{place}: {e.value} outside {e.ci95}"
+
+
+def _states(found: Study) -> Iterator[str]:
+    written = {one["model"]: one for one in record.to_dict(found)["fits"]}
+    for one in found.findings:
+        lost = {q.name for q in one.parameters if q.remark == UNDETERMINED}
+        if set(written[one.name]["not_determined"]) != lost:
+            yield f"{one.name}: the record calls other parameters not determined than the table"
+        if not set(one.fit.undetermined) <= lost:
+            yield f"{one.name}: {one.fit.undetermined} not determined by the fit, {lost} in the table"
+        if one.identifiability is not None and set(one.identifiability.undetermined) != lost:
+            yield f"{one.name}: identifiability {one.identifiability.undetermined}, table {lost}"
+        for row in parameter_rows(one):
+            if row["remark"] == UNDETERMINED and "±" in row["value"]:
+                yield f"{one.name} {row['name']}: a standard deviation of what is not determined"
+        missed = one.fit.adequacy.startswith("inadequate")
+        if missed and not one.doubts.inadequate:
+            yield f"{one.name}: inadequate without a doubt"
+        if one.doubts.inadequate != any("intervals hold only if" in words for words in one.doubts.words):
+            yield f"{one.name}: in doubt, but not said"
+
+
+def _sentences(found: Study) -> Iterator[str]:
+    words = " ".join(
+        [*found.warnings, found.match.verdict if found.match else "", found.choice.verdict if found.choice else ""]
+    )
+    for value, low, high in re.findall(r"(\d+) %(?: apart[a-z ]*)? \(95 % interval (\d+)–(\d+) %\)", words):
+        if not int(low) <= int(value) <= int(high):
+            yield f"{value} % outside {low}–{high} %"
+    if found.match is None:
+        return
+    names = [one.fit.name.removeprefix("lambert+") for one in (found.match.empirical, found.match.microfacet)]
+    for name, other in (names, names[::-1]):
+        if f"clearly prefer {name}" in words and f"clearly prefer {other}" in words:
+            yield "the data prefer both"
+    apart = found.match.measured_distance
+    if "hardly differ:" in words and apart.value > 0.1 + ROUNDING:
+        yield f"hardly differ, {apart.value} apart"
+    if "cannot tell them apart" in words and "tells them apart at every" in words:
+        yield "told apart and not"
+
+
+TRUTHS = [
+    ("lambert", {}),
+    ("lambert+ggx", {"alpha": (0.01, 0.7), "eta": (1.2, 2.5)}),
+    ("lambert+blinn-phong", {"exponent": (2.0, 2000.0), "ks": (0.02, 0.5)}),
+    ("ggx", {"alpha": (0.05, 0.6), "eta": (1.3, 10.0)}),
+    ("oren-nayar", {}),
+]
+
+
+def made(seed: int) -> fm.Measurements:
+    """Readings of a random material at random angles, with a random noise that is given or not."""
+    rng = np.random.default_rng(seed)
+    name, ranges = TRUTHS[seed % len(TRUTHS)]
+    drawn = {key: float(np.exp(rng.uniform(*np.log(limits)))) for key, limits in ranges.items()}
+    theta_i = np.sort(rng.uniform(0, np.deg2rad(75), rng.integers(1, 5)))
+    theta_o = np.linspace(-1.3, rng.uniform(0.3, 1.4), rng.integers(7, 60))
+    noise = float(np.exp(rng.uniform(np.log(1e-3), np.log(0.2))))
+    m = fm.simulate(
+        fm.model(name, **drawn), theta_i, theta_o, relative_noise=noise, absolute_noise=noise * 0.05, seed=seed
+    )
+    return m if seed % 3 else dataclasses.replace(m, sigma=None)
+
+
+def test_a_study_agrees_with_itself() -> None:
+    assert contradictions(study(made(1), PAIR, sampling=False)) == []
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("seed", range(2, 32))
+def test_random_studies_agree_with_themselves(seed: int) -> None:
+    assert contradictions(study(made(seed), PAIR, sampling=False)) == []
+
+
+def test_identical_values_are_followed_by_nothing() -> None:
+    theta_o = np.linspace(-1.2, 1.2, 30)
+    m = fm.from_arrays(np.full(30, 0.5), theta_o, np.full(30, 0.2), sigma=np.full(30, 0.01))
+    found = study(m, "lambert", sampling=False)
+    assert found.findings[0].fit.adequacy == "adequacy unknown: all values are identical"
+    assert contradictions(found) == []
