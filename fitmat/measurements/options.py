@@ -53,7 +53,10 @@ class Options:
         if (self.intensity is None) != (self.distance is None):
             got = "intensity" if self.distance is None else "distance"
             raise ReadError(f"{got} alone, expected intensity and distance (--intensity, --distance). Give both.")
-
+        if self.unknown_scale and (self.panel is not None or self.source is not None):
+            got = "panel (--panel)" if self.panel is not None else "intensity and distance (--intensity, --distance)"
+            expected = "expected one of the two: a scale that is fitted takes the place of a known one"
+            raise ReadError(f"{got} beside unknown_scale (--unknown-scale), {expected}. Leave one out.")
         if self.panel is not None and not 0 < self.panel <= 2:
             expected = "expected its reflectance factor, 0 to 2 (Spectralon: 0.99)"
             raise ReadError(f"panel = {self.panel:g} (--panel), {expected}. Correct it.")

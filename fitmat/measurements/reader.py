@@ -164,7 +164,8 @@ def _recording(source: Source, columns: str | Mapping[str, str | int] | None, op
 def _refuse_needless(name: str, layout: str, columns: str | Mapping[str, str | int] | None, options: Options) -> None:
     """Stop where the user says of a file what its format settles."""
     usual = Options()
-    said = [n for n in ("quantity", "where", "angle_unit", "forward") if getattr(options, n) != getattr(usual, n)]
+    settled = ("quantity", "where", "angle_unit", "forward", "specular_azimuth")
+    said = [n for n in settled if getattr(options, n) != getattr(usual, n)]
     for option in [*(["columns"] if columns else []), *said][:1]:
         expected = f"expected no {option}= (--{option.replace('_', '-')}): the format settles it"
         raise ReadError(f"{name}: a file of the format {layout}, {expected}. Leave it out.")

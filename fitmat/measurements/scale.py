@@ -23,8 +23,13 @@ def of_unknown_scale(m: Measurements) -> Measurements:
     direction on which it lies; exact for a Lambertian surface.
 
     Raises:
-        ReadError: no value is positive.
+        ReadError: no value is positive, or the instrument states how well the scale is known.
     """
+    if m.instrument.calibration:
+        got = f"calibration = {m.instrument.calibration:g} (--calibration) beside unknown_scale (--unknown-scale)"
+        raise ReadError(
+            f"{m.source}: {got}, expected one of the two: the scale is known so well, or not at all. Leave one out."
+        )
     mirror = np.stack([-m.wi[:, 0], -m.wi[:, 1], m.wi[:, 2]], axis=1)
     apart = np.sqrt(np.maximum(1.0 - np.sum(mirror * m.wo, axis=1) ** 2, 1e-6))
     weight = (m.wo[:, 2] * apart)[:, None] * m.valid

@@ -78,6 +78,13 @@ def test_a_free_scale_leaves_the_weights_to_a_factor_of_e() -> None:
     assert fit.values[place["alpha"]] == pytest.approx(0.2, abs=0.01)
 
 
+def test_a_panel_of_unknown_reflectance_leaves_ratios() -> None:
+    """Ratios of 1, 2 and 4 stay in proportion, whatever the panel reflects."""
+    m = fm.read({**ANGLES, "panel_ratio": [1.0, 2.0, 4.0]}, unknown_scale=True)
+    np.testing.assert_allclose(m.value[:, 0] / m.value[0, 0], [1.0, 2.0, 4.0], rtol=EXACT)
+    assert m.notes[0] == "ratio to a white panel in the same geometry, to which the BRDF is proportional."
+
+
 def test_rows_can_be_chosen() -> None:
     table = {**ANGLES, "brdf": [1.0, 2.0, 3.0], "material": ["gold", "tin", "gold"]}
     m = fm.read(table, where="material=gold")
@@ -97,6 +104,31 @@ def test_rows_can_be_chosen() -> None:
             r"panel = 99 \(--panel\), expected its reflectance factor, 0 to 2",
         ),
         ({"radiance": [1.0] * 3}, {}, r"radiances without the light .* or fit the scale \(--unknown-scale\)"),
+        (
+            {"brdf": [1.0] * 3},
+            {"intensity": 5.0, "distance": 2.0},
+            r"\(--intensity, --distance\), expected none: the values are brdf, not radiance\. Leave them out",
+        ),
+        (
+            {"brdf_cos": [1.0] * 3},
+            {"panel": 0.99},
+            r"panel = 0\.99 \(--panel\), expected none: the values are brdf_cos",
+        ),
+        (
+            {"radiance": [1.0] * 3},
+            {"unknown_scale": True, "intensity": 5.0, "distance": 2.0},
+            r"intensity and distance .* beside unknown_scale \(--unknown-scale\), expected one of the two",
+        ),
+        (
+            {"panel_ratio": [1.0] * 3},
+            {"unknown_scale": True, "panel": 0.99},
+            r"panel \(--panel\) beside unknown_scale \(--unknown-scale\), expected one of the two",
+        ),
+        (
+            {"brdf": [1.0] * 3},
+            {"unknown_scale": True, "instrument": fm.Instrument(calibration=0.03)},
+            r"calibration = 0\.03 \(--calibration\) beside unknown_scale \(--unknown-scale\), expected one",
+        ),
         ({"brdf": [0.0] * 3}, {"unknown_scale": True}, r"no positive values, expected readings of reflected light"),
         ({"brdf": [1.0] * 3}, {"where": "material=gold"}, r"where = 'material=gold' \(--where\), expected a column of"),
         (

@@ -1,5 +1,6 @@
 """Every wrong table gives one ReadError that says what, where, got, expected and what to do."""
 
+import inspect
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ import pandas as pd
 import pytest
 
 from fitmat.errors import ReadError
+from fitmat.measurements.instrument import Instrument
 from fitmat.measurements.reader import read
 
 HEAD = "theta_i,theta_o,brdf\n"
@@ -231,3 +233,39 @@ def test_unreadable_file(tmp_path, monkeypatch):
     monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(ReadError, match=r"cannot be opened \(Permission denied\), expected a readable file"):
         read(tmp_path / "locked.csv")
+
+
+IN_PLANE_FRED = "type bsdf_data\nformat angles=deg bsdf=value scale=1\n15 0\n-15 0 0.0015\n0 0 0.002\n15 0 0.1\n"
+
+NEEDLESS: dict[str, tuple[dict[str, Any], str]] = {
+    "columns": ({"columns": "brdf=3"}, r"no columns= \(--columns\): the format settles it"),
+    "quantity": ({"quantity": "brdf"}, r"no quantity= \(--quantity\): the format settles it"),
+    "where": ({"where": "material=Alu"}, r"no where= \(--where\): the format settles it"),
+    "angle unit": ({"angle_unit": "degrees"}, r"no angle_unit= \(--angle-unit\): the format settles it"),
+    "forward": ({"forward": "negative"}, r"no forward= \(--forward\): the format settles it"),
+    "specular azimuth": (
+        {"specular_azimuth": 0},
+        r"no specular_azimuth= \(--specular-azimuth\): the format settles it",
+    ),
+    "panel": ({"panel": 0.99}, r"panel = 0\.99 \(--panel\), expected none: the values are brdf"),
+    "source": ({"intensity": 1.0, "distance": 2.0}, r"\(--intensity, --distance\), expected none: the values are brdf"),
+    "calibration": (
+        {"unknown_scale": True, "instrument": Instrument(calibration=0.1)},
+        r"calibration = 0\.1 \(--calibration\) beside unknown_scale",
+    ),
+}
+
+
+@pytest.mark.parametrize(("options", "message"), NEEDLESS.values(), ids=NEEDLESS)
+def test_what_a_format_settles_is_not_said_again(tmp_path, options, message):
+    """Every option of `read` but unknown_scale and instrument, which speak of no format."""
+    path = tmp_path / "lobe.txt"
+    path.write_text(IN_PLANE_FRED)
+    with pytest.raises(ReadError, match=message) as raised:
+        read(path, **options)
+    assert str(raised.value).startswith("lobe.txt: ")
+
+
+def test_every_option_has_a_format_that_settles_it():
+    said = {option for options, _ in NEEDLESS.values() for option in options}
+    assert said == inspect.signature(read).parameters.keys() - {"source"}

@@ -62,7 +62,7 @@ def test_samples_without_a_fault_are_read(name, tmp_path):
     with fuzz.READERS[name].prepare():
         for _ in range(3):
             (tmp_path / fuzz.NAME).write_bytes(fuzz.READERS[name].sample(rng))
-            assert read(tmp_path / fuzz.NAME, panel=0.99 if name == "text" else None).valid.any()
+            assert read(tmp_path / fuzz.NAME, unknown_scale=name == "text").valid.any()
 
 
 # --- hostile files --------------------------------------------------------------------------------
