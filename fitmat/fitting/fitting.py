@@ -26,7 +26,7 @@ from fitmat.fitting.likelihood import (
 )
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.losses import loss as find_loss
-from fitmat.fitting.priors import prepare_prior
+from fitmat.fitting.priors import prepare_prior, refuse_idle
 from fitmat.fitting.result import Ends, Fit, conclude
 from fitmat.fitting.starts import starting_points
 from fitmat.maths.least_squares import least_squares
@@ -91,8 +91,8 @@ def fit(
         A `Fit`; a numerical failure is its `result`, not an exception.
 
     Raises:
-        FitmatError: float64 is off, the model is unknown, a prior is not of this model, or there are too few valid
-            samples.
+        FitmatError: float64 is off, the model is unknown, a prior is not of this model or could change nothing, or
+            there are too few valid samples.
 
     Example:
         >>> fit(read("measurements.csv"), "lambert+ggx", fixed={"ks": 1.0})  # doctest: +SKIP
@@ -102,10 +102,15 @@ def fit(
             'fitmat needs 64-bit floats: run jax.config.update("jax_enable_x64", True) before building arrays.'
         )
     channels = len(measurements.channels)
+    if masking is not None and not isinstance(to, str):
+        raise ModelError(
+            f"masking = {masking!r} beside a model, expected it with a name: a model has its own. Leave it out."
+        )
     template = model(to, channels=channels, masking=masking) if isinstance(to, str) else to
     chosen = find_loss(loss)
     shown = _seen(template, measurements)
     known = dict(priors or {})
+    refuse_idle(known, fixed or {}, chosen)
     if chosen.infers_noise:
         shown, known = Noisy(shown), _noise_priors(measurements) | known
     held = _held(shown, fixed or {})

@@ -15,6 +15,9 @@ from fitmat.models.terms.fresnel import Dielectric, f0_f82_from_ior
 ABSORBING = 0.01
 """κ from which a material counts as a metal: the lower bound of the parameter."""
 
+OPTICAL = ("eta", "kappa", "f0", "f82")
+"""Parameters that the refractive index determines."""
+
 Known = dict[str, dict[str, np.ndarray]]
 """Model name → parameter → value to hold."""
 
@@ -50,7 +53,7 @@ def of_material(name: str, material: str, channels: tuple[str, ...]) -> Known:
     covers, base = parts[: name.count(OVER)], parts[name.count(OVER) :]
     name = OVER.join([*covers, "+".join(renamed.get(part, part) for part in base)])
     f0, f82 = f0_f82_from_ior(eta, kappa)
-    values = {"eta": eta, "kappa": kappa, "f0": f0, "f82": f82}
+    values = dict(zip(OPTICAL, (eta, kappa, f0, f82), strict=True))
     names = {e.name: e for e in entries(model(name, channels=len(channels)))}
     known = {}
     for part in renamed.values():

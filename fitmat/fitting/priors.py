@@ -6,7 +6,7 @@ a Gaussian in the same coordinate, cut off at the bounds: a log-normal of that m
 scale is log. A shared scale g has ln g ~ N(0, calibration²).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,9 +15,10 @@ from jaxtyping import ArrayLike, Float
 from fitmat.errors import ModelError
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.likelihood import Prior
+from fitmat.fitting.losses import Loss
 from fitmat.measurements.instrument import Instrument
 from fitmat.models.base import AbstractBRDF
-from fitmat.models.parameters import Entry, entries, vector
+from fitmat.models.parameters import Entry, entries, refuse_repeated, vector
 from fitmat.text import with_error
 
 DISCREPANCY = "discrepancy"
@@ -44,6 +45,7 @@ def prepare_prior(
         precision[places["scale"].place] = 1.0 / instrument.calibration
     for name, (centre, sd) in given.items():
         if name == DISCREPANCY:
+            _refuse_centre(centre)
             discrepancy = 1.0 / _positive(name, sd).item()
             continue
         if name not in places:
@@ -56,6 +58,36 @@ def prepare_prior(
     if not precision.any() and not discrepancy:
         return None
     return Prior(mean, precision, np.asarray(discrepancy))
+
+
+def refuse_idle(given: Container[str], fixed: Iterable[str], loss: Loss) -> None:
+    """Stop where a prior could change nothing.
+
+    Args:
+        given: Names of what has a prior.
+        fixed: Names of the parameters that are held.
+        loss: What is minimised.
+
+    Raises:
+        ModelError: a parameter is held, or the loss has no discrepancy.
+    """
+    for name in fixed:
+        if name in given:
+            expected = "expected one of the two: of what is fixed nothing is left to learn"
+            raise ModelError(
+                f"{name} is fixed and has a prior (--fix or --ior, and --prior), {expected}. Leave one out."
+            )
+    if DISCREPANCY in given and not loss.infers_discrepancy:
+        expected = "expected none: it takes the model for exact"
+        raise ModelError(
+            f"prior of {DISCREPANCY} (--prior) under the loss {loss.name} (--loss), {expected}. Leave one out."
+        )
+
+
+def _refuse_centre(centre: ArrayLike) -> None:
+    if np.any(np.asarray(centre, float) != 0):
+        expected = "expected 0, from which its sd is counted, for example discrepancy=0,0.01"
+        raise ModelError(f"prior of {DISCREPANCY}: centre {centre}, {expected}.")
 
 
 def _inside(entry: Entry, centre: ArrayLike) -> np.ndarray:
@@ -79,11 +111,12 @@ def assignments(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
     """`NAME=CENTRE,SD` texts as the argument `priors` of `fit`.
 
     Raises:
-        ModelError: a text is not of that form.
+        ModelError: a text is not of that form, or a name is given twice.
     """
-    found = {}
+    found: dict[str, tuple[float, float]] = {}
     for text in texts:
         name, _, values = text.partition("=")
+        refuse_repeated(name.strip(), found, "--prior")
         try:
             centre, sd = (float(v) for v in values.split(","))
         except ValueError as error:

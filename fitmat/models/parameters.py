@@ -4,7 +4,7 @@ This room knows nothing of reflection and fits nothing.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from typing import Any, Literal, TypeVar
 
 import equinox as eqx
@@ -153,16 +153,27 @@ def assignments(texts: Sequence[str], option: str) -> dict[str, np.ndarray]:
     """`NAME=VALUE` texts as arrays; a value may be a comma-separated list, one number per channel.
 
     Raises:
-        ModelError: a text is not of that form.
+        ModelError: a text is not of that form, or a name is given twice.
     """
-    found = {}
+    found: dict[str, np.ndarray] = {}
     for text in texts:
         name, _, values = text.partition("=")
+        refuse_repeated(name.strip(), found, option)
         try:
             found[name.strip()] = np.array([float(v) for v in values.split(",")])
         except ValueError as error:
             raise ModelError(f"{option} {text!r}: expected NAME=NUMBER, for example ks=1.") from error
     return found
+
+
+def refuse_repeated(name: str, found: Container[str], option: str) -> None:
+    """Stop at a parameter that the command line has given before.
+
+    Raises:
+        ModelError: names the option and the parameter.
+    """
+    if name in found:
+        raise ModelError(f"{option} {name} is given twice, expected one value of it. Leave one out.")
 
 
 def check_range(model: eqx.Module) -> None:

@@ -3,7 +3,7 @@
 It fits nothing; a model or a parameter that does not exist is refused here, before any work.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,8 @@ import numpy as np
 from fitmat.errors import ModelError
 from fitmat.fitting import known
 from fitmat.fitting.losses import DEFAULT
-from fitmat.fitting.priors import DISCREPANCY
+from fitmat.fitting.losses import loss as find_loss
+from fitmat.fitting.priors import DISCREPANCY, refuse_idle
 from fitmat.judgement.choice import every_model
 from fitmat.measurements.samples import Measurements
 from fitmat.models.parameters import entries
@@ -73,17 +74,19 @@ def plan(
         tilt: Whether the sample's normal may lean.
 
     Raises:
-        ModelError: a name is unknown, or something given concerns no model.
+        ModelError: a name is unknown, something given concerns no model, or two things given contradict each other.
     """
     names = model_names(asked, measurements)
     prepared = known.prepare_known(names, measurements, ior=ior, tilt=tilt)
     having = {name: {e.name for e in entries(model(name))} | _BESIDE for name in prepared}
-    for flag, given in (("--fix", fixed or {}), ("--prior", priors or {})):
-        _refuse_foreign(flag, given, having)
+    _refuse_foreign("--fix", fixed or {}, {name: has - _BESIDE for name, has in having.items()})
+    _refuse_foreign("--prior", priors or {}, having)
+    for held in prepared.values():
+        _refuse_known(fixed or {}, held)
     masked = [n for n in prepared if any(LOBES[part].has_masking for part in lobe_names(n))]
     if masking is not None and not masked:
         raise ModelError(f"--masking {masking}: none of {', '.join(prepared)} has a masking to choose.")
-    return {
+    jobs = {
         name: {
             "fixed": {**held, **_of(fixed, having[name] - _BESIDE)},
             "priors": _of(priors, having[name]),
@@ -92,10 +95,20 @@ def plan(
         }
         for name, held in prepared.items()
     }
+    for job in jobs.values():
+        refuse_idle(job["priors"], job["fixed"], find_loss(loss))
+    return jobs
 
 
 def _of(given: Mapping[str, Any] | None, names: set[str]) -> dict[str, Any]:
     return {key: value for key, value in (given or {}).items() if key in names}
+
+
+def _refuse_known(fixed: Container[str], held: Iterable[str]) -> None:
+    for key in held:
+        if key in fixed and key.rpartition(".")[2] in known.OPTICAL:
+            expected = "expected one of the two: the material says it already"
+            raise ModelError(f"--fix {key} beside --ior, {expected}. Leave one out.")
 
 
 def _refuse_foreign(flag: str, given: Mapping[str, np.ndarray], having: Mapping[str, set[str]]) -> None:

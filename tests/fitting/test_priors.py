@@ -93,6 +93,7 @@ def test_words_say_what_was_believed() -> None:
     [
         ({"zeta": (1.0, 1.0)}, "prior of 'zeta': lambert\\+ggx has kd, ks, alpha, eta; also discrepancy"),
         ({"alpha": (3.0, 1.0)}, "prior of alpha: centre .*3.* expected a value from"),
+        ({"discrepancy": (0.1, 0.01)}, r"prior of discrepancy: centre 0\.1, expected 0, from which its sd is counted"),
         ({"alpha": (0.3, 0.0)}, "prior of alpha: standard deviation .* expected a positive number"),
     ],
 )
@@ -105,3 +106,28 @@ def test_texts_of_the_command_line() -> None:
     assert priors.assignments(["eta=1.5,0.05"]) == {"eta": (1.5, 0.05)}
     with pytest.raises(ModelError, match=r"--prior 'eta=1\.5': expected NAME=CENTRE,SD, for example eta=1\.5,0\.05"):
         priors.assignments(["eta=1.5"])
+    with pytest.raises(ModelError, match=r"--prior eta is given twice, expected one value of it\. Leave one out"):
+        priors.assignments(["eta=1.5,0.05", " eta =1.4,0.1"])
+
+
+@pytest.mark.parametrize(
+    ("told", "sentence"),
+    [
+        (
+            {"fixed": {"kd": 0.5}, "priors": {"kd": (0.5, 0.1)}},
+            r"kd is fixed and has a prior \(--fix or --ior, and --prior\), expected one of the two",
+        ),
+        (
+            {"loss": "gaussian", "priors": {"discrepancy": (0.0, 0.1)}},
+            r"prior of discrepancy \(--prior\) under the loss gaussian \(--loss\), expected none",
+        ),
+    ],
+)
+def test_priors_that_could_change_nothing_are_refused(made: fm.Measurements, told: dict, sentence: str) -> None:
+    with pytest.raises(ModelError, match=sentence):
+        fm.fit(made, "lambert", **told)
+
+
+def test_a_model_has_its_own_masking(made: fm.Measurements) -> None:
+    with pytest.raises(ModelError, match="masking = 'separable' beside a model, expected it with a name"):
+        fm.fit(made, fm.model("ggx"), masking="separable")

@@ -14,6 +14,7 @@ from fitmat.errors import ModelError
 from fitmat.models.laws import example
 from fitmat.models.parameters import (
     as_parameter,
+    assignments,
     check_range,
     entries,
     param,
@@ -109,3 +110,8 @@ def test_bounds_belong_to_the_range() -> None:
 def test_values_that_are_no_numbers_are_refused(value: object) -> None:
     with pytest.raises(ModelError, match=r"parameter value .*: expected a number or one number per channel"):
         as_parameter(value)
+
+
+def test_a_parameter_is_given_once() -> None:
+    with pytest.raises(ModelError, match=r"--fix kd is given twice, expected one value of it\. Leave one out"):
+        assignments(["kd=0.5", "ks=1", "kd = 0.4"], "--fix")

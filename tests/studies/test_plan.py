@@ -50,9 +50,24 @@ def test_a_known_material_is_held_and_renames_its_model(measurements: Measuremen
     [
         ({"fixed": {"zz": 1.0}}, r"--fix zz: no model of lambert has it; they have kd\."),
         ({"priors": {"eta": (1.5, 0.1)}}, r"--prior eta: no model of lambert has it; they have kd\."),
+        ({"fixed": {"discrepancy": 0.0}}, r"--fix discrepancy: no model of lambert has it; they have kd\."),
+        (
+            {"fixed": {"kd": 0.5}, "priors": {"kd": (0.5, 0.1)}},
+            r"kd is fixed and has a prior \(--fix or --ior, and --prior\)",
+        ),
+        ({"loss": "ngan", "priors": {"discrepancy": (0.0, 0.1)}}, r"under the loss ngan \(--loss\), expected none"),
         ({"masking": "separable"}, "--masking separable: none of lambert has a masking to choose"),
     ],
 )
 def test_options_that_concern_no_model(measurements: Measurements, chosen: dict, sentence: str) -> None:
     with pytest.raises(ModelError, match=sentence):
         plan("lambert", measurements, **chosen)
+
+
+def test_what_a_material_says_is_not_said_again(measurements: Measurements) -> None:
+    with pytest.raises(
+        ModelError, match="--fix eta beside --ior, expected one of the two: the material says it already"
+    ):
+        plan("ggx", measurements, ior="N-BK7", fixed={"eta": 1.5})
+    with pytest.raises(ModelError, match=r"eta is fixed and has a prior \(--fix or --ior, and --prior\)"):
+        plan("ggx", measurements, ior="N-BK7", priors={"eta": (1.5, 0.1)})
