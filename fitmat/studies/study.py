@@ -16,6 +16,7 @@ from jaxtyping import ArrayLike
 from fitmat._types import SAMPLING, Progress
 from fitmat.errors import ModelError
 from fitmat.fitting.losses import DEFAULT
+from fitmat.fitting.losses import loss as find_loss
 from fitmat.fitting.streamed import fit_from, fit_part, rows
 from fitmat.judgement.choice import Choice, choose
 from fitmat.judgement.examination.examining import warnings
@@ -126,6 +127,7 @@ def study(
     """
     say = progress or (lambda *_: None)
     if second_opinion:
+        _refuse_unsampled(measurements, loss, sampling)
         second_sampler.require()
     stream = _as_stream(measurements)
     shown = stream if isinstance(stream, Measurements) else stream.part
@@ -138,6 +140,18 @@ def study(
     walking = sampling and first[0].fit.loss.posterior and first[0].fit.n_values <= MOST_SAMPLED
     posteriors = _sample_each(first, seed, resume, say) if walking else first
     return judge(posteriors, seed=seed, second_opinion=second_opinion, full=full, progress=say)
+
+
+def _refuse_unsampled(measurements: Measurements | Stream, loss: str, sampling: bool) -> None:
+    """Stop where there will be no draws of which a second sampler could say anything."""
+    asked, expected = "a second opinion (--check-posterior)", "expected a posterior that is sampled. Leave one out."
+    if not sampling:
+        raise ModelError(f"{asked} without sampling (--no-mcmc), {expected}")
+    if not find_loss(loss).posterior:
+        raise ModelError(f"{asked} under the loss {loss} (--loss), which is no likelihood, {expected}")
+    if measurements.n_valid > MOST_SAMPLED:
+        got = f"{asked} on {measurements.n_valid:,} values"
+        raise ModelError(f"{got}, expected at most {MOST_SAMPLED:,}, which are sampled. Leave it out.")
 
 
 def _as_stream(measurements: Measurements | Stream) -> Measurements | Stream:
@@ -219,7 +233,7 @@ def judge(
     Args:
         posteriors: By `sample` or `laplace`.
         seed: Of the replicated data and of the second sampler.
-        second_opinion: Whether to sample chains a second time with another method.
+        second_opinion: Whether to sample chains a second time with another method; what has none goes without.
         full: As in `study`.
         progress: Called with what is done next.
     """
@@ -246,7 +260,8 @@ def judge(
             findings.append(found)
             say(words, len(findings), count)
     if second_opinion:
-        findings = [_asked_again(found, seed, say) if found.posterior in looked_at else found for found in findings]
+        asked = [found.posterior in looked_at and found.posterior.chain is not None for found in findings]
+        findings = [_asked_again(f, seed, say) if again else f for f, again in zip(findings, asked, strict=True)]
     return Study(tuple(findings), match, choice, full, _odd(posteriors))
 
 

@@ -144,3 +144,32 @@ def test_of_many_models_a_few_are_examined_one_by_one(
     assert len(asked) == DETAILED
     assert {found.match.empirical, found.match.microfacet} <= set(asked)
     assert [f.posterior for f in found.detailed] == asked
+
+
+@pytest.mark.parametrize(
+    ("told", "most", "sentence"),
+    [
+        (
+            {"sampling": False},
+            10**6,
+            r"a second opinion \(--check-posterior\) without sampling \(--no-mcmc\), expected",
+        ),
+        ({"loss": "ngan"}, 10**6, r"\(--check-posterior\) under the loss ngan \(--loss\), which is no likelihood"),
+        ({}, 50, r"\(--check-posterior\) on 51 values, expected at most 50, which are sampled\. Leave it out"),
+    ],
+)
+def test_a_second_opinion_needs_a_first(
+    measurements: Measurements, monkeypatch: pytest.MonkeyPatch, told: dict[str, Any], most: int, sentence: str
+) -> None:
+    monkeypatch.setattr(room, "fit_each", lambda *_, **__: pytest.fail("a fit was started"))
+    monkeypatch.setattr(room, "MOST_SAMPLED", most)
+    with pytest.raises(FitmatError, match=sentence):
+        study(measurements, "lambert", second_opinion=True, **told)
+
+
+def test_what_was_not_sampled_has_no_second_opinion(studied: Study, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As after an interrupt: the rest is told all the same."""
+    monkeypatch.setattr(room, "identify", lambda posterior: None)
+    monkeypatch.setattr(room, "check_predictions", lambda posterior, seed: posterior)
+    found = judge(studied.posteriors[:1], seed=0, second_opinion=True)
+    assert [f.second_opinion for f in found.findings] == [None]
