@@ -33,6 +33,7 @@ from fitmat.cli.flags.fitting import (
     SeedFlag,
     TiltFlag,
 )
+from fitmat.cli.flags.given import Command
 from fitmat.cli.flags.groups import takes
 from fitmat.cli.flags.instrument import instrument
 from fitmat.cli.flags.models import CheckFlag, NameFlag
@@ -50,12 +51,12 @@ from fitmat.cli.flags.simulate import (
     ThetaIFlag,
     ThetaOFlag,
 )
+from fitmat.cli.flags.version import VersionFlag
 
 DEFAULT_MODELS = "lambert+blinn-phong,lambert+ggx"
 NOT_CONVERGED = 3
 
 app = typer.Typer(
-    add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
@@ -69,7 +70,13 @@ app = typer.Typer(
 )
 
 
+@app.callback()
+def about(version: VersionFlag = False) -> None:
+    """What holds for every command."""
+
+
 @app.command(
+    cls=Command,
     epilog="Columns of a table, by name: theta_i, theta_o and phi (or phi_i and phi_o, or a signed theta_o alone) in "
     "degrees; brdf, brdf_cos, reflectance_factor, radiance, or signal and reference; brdf_r, brdf_g, brdf_b or "
     "brdf_550 for channels; sigma where the noise is known.\n\n"
@@ -81,7 +88,7 @@ app = typer.Typer(
     "  fitmat fit measurements.csv --models lambert+ggx --fix ks=1 --out run1\n\n"
     "  fitmat fit gold.csv --models ggx --ior Au --fix ks=1\n\n"
     "  fitmat fit scan.txt --columns theta_i=AOI,brdf=4 --no-mcmc\n\n"
-    "  fitmat fit mirror.csv --receiver-angle 0.5 --calibration 0.03"
+    "  fitmat fit mirror.csv --receiver-angle 0.5 --calibration 0.03",
 )
 @takes(reading, instrument)
 def fit(
@@ -153,9 +160,10 @@ def fit(
 
 
 @app.command(
+    cls=Command,
     epilog="Parameters that are not set keep the model's defaults, see fitmat models.\n\n"
     "Example:\n\n"
-    "  fitmat simulate lambert+ggx --set kd=0.3 --set alpha=0.2 --out plastic.csv"
+    "  fitmat simulate lambert+ggx --set kd=0.3 --set alpha=0.2 --out plastic.csv",
 )
 @takes(instrument)
 def simulate(
@@ -195,7 +203,8 @@ def simulate(
 
 
 @app.command(
-    epilog="Examples:\n\n  fitmat check measurements.csv --plot coverage.png\n\n  fitmat check gold.binary --json"
+    cls=Command,
+    epilog="Examples:\n\n  fitmat check measurements.csv --plot coverage.png\n\n  fitmat check gold.binary --json",
 )
 @takes(reading, instrument)
 def check(
@@ -218,9 +227,10 @@ def check(
 
 
 @app.command(
+    cls=Command,
     epilog="Examples:\n\n"
     "  fitmat convert gold.binary gold.parquet\n\n"
-    "  fitmat convert scan.txt scan.bsdf --columns theta_i=AOI,brdf=4"
+    "  fitmat convert scan.txt scan.bsdf --columns theta_i=AOI,brdf=4",
 )
 @takes(reading)
 def convert(
@@ -240,7 +250,7 @@ def convert(
     typer.echo("\n".join([str(measurements), *writing.losses(measurements, out), str(out)]))
 
 
-@app.command()
+@app.command(cls=Command)
 def models(
     name: NameFlag = None,
     check: CheckFlag = False,
@@ -250,7 +260,7 @@ def models(
 
     if check:
         process.set_up()
-        if surprises := manual.check():
+        if surprises := manual.check(only=manual.within(name)):
             process.end(f"{', '.join(surprises)} break a law that their manual pages do not mention.")
     elif name is None:
         manual.list_models()
@@ -259,8 +269,9 @@ def models(
 
 
 @app.command(
+    cls=Command,
     epilog="Examples:\n\n  fitmat design measurements.csv --for eta\n\n"
-    "  fitmat design measurements.csv --for match --kind curve --plot next.png"
+    "  fitmat design measurements.csv --for match --kind curve --plot next.png",
 )
 @takes(reading, instrument)
 def design(
@@ -298,7 +309,7 @@ def design(
     typer.echo(design.as_json(found) if json_ else design.as_text(found))
 
 
-@app.command()
+@app.command(cls=Command)
 def losses() -> None:
     """List what a fit can minimise, by name: the default, other likelihoods, and the objectives of the literature."""
     from fitmat.cli import manual
@@ -306,7 +317,7 @@ def losses() -> None:
     manual.list_losses()
 
 
-@app.command()
+@app.command(cls=Command)
 def cache(
     clear: ClearFlag = False,
 ) -> None:

@@ -87,7 +87,7 @@ def page(name: str) -> None:
         fresnel_terms()
         return
     out = Console()
-    for part in [name] if name in LOBES else lobe_names(name):
+    for part in _parts(name):
         lobe = LOBES[part]
         out.print(f"[bold]{part}[/bold]\n")
         for paragraph in inspect.cleandoc(lobe.shape.__doc__ or "").split("\n\n"):
@@ -100,6 +100,20 @@ def page(name: str) -> None:
             unit = "" if p.unit == "1" else p.unit
             table.add_row(key, p.symbol, f"{p.lower:g} – {p.upper:g}", unit, f"{default:g}", spread, p.doc)
         out.print(table)
+
+
+def _parts(name: str) -> list[str]:
+    return [name] if name in LOBES else lobe_names(name)
+
+
+def within(name: str | None) -> Callable[[str], bool]:
+    """Which lobes a name means: those of a model, or all where there is none.
+
+    Raises:
+        ModelError: no such lobe.
+    """
+    parts = LOBES.keys() if name is None else _parts(name)
+    return lambda lobe: lobe in parts
 
 
 def check(*, seed: int = 0, only: Callable[[str], bool] = lambda name: True) -> list[str]:

@@ -12,5 +12,5 @@ NameFlag = Annotated[
 ]
 
 CheckFlag = Annotated[
-    bool, typer.Option("--check", help="Measure which laws of reflection every lobe keeps (some minutes).")
+    bool, typer.Option("--check", help="Measure which laws of reflection NAME keeps, or every lobe (some minutes).")
 ]
