@@ -4,9 +4,11 @@ A description only; `models.around.instrument` is the model that follows from it
 """
 
 import dataclasses
+from numbers import Real
 
 import numpy as np
 
+from fitmat import arguments
 from fitmat.errors import ReadError
 
 WIDEST = np.deg2rad(30.0)
@@ -27,7 +29,7 @@ class Instrument:
         dark: Dark signal or stray light in units of f_r cosθ_o, sr⁻¹; None where it is to be fitted.
 
     Raises:
-        ReadError: a number is out of range.
+        FitmatError: something is not a number, or out of range.
     """
 
     source: float = 0.0
@@ -39,9 +41,12 @@ class Instrument:
         limits = {"source": WIDEST, "receiver": WIDEST, "calibration": UNKNOWN_SCALE, "dark": 1.0}
         for name, upper in limits.items():
             value = getattr(self, name)
-            if value is not None and not (np.isfinite(value) and 0 <= value <= upper):
-                unit = " radians (half-angle)" if upper == WIDEST else ""
-                raise ReadError(f"{name} = {value:g} of the instrument, expected 0 to {upper:.4g}{unit}. Correct it.")
+            if value is None and name == "dark":
+                continue
+            arguments.kind(f"{name} of the instrument", value, Real)
+            if not (np.isfinite(value) and 0 <= value <= upper):
+                unit = " radians (half-angle); is it in degrees (np.deg2rad)?" if upper == WIDEST else ". Correct it."
+                raise ReadError(f"{name} = {value:g} of the instrument, expected 0 to {upper:.4g}{unit}")
 
     @property
     def ideal(self) -> bool:

@@ -5,11 +5,13 @@ It converts no quantity and reads no file.
 
 import dataclasses
 import html
+from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
 
+from fitmat import arguments
 from fitmat.errors import ReadError
 from fitmat.maths.directions import from_angles, relative_azimuth, signed_azimuth, signed_zenith, zenith
 from fitmat.measurements.instrument import IDEAL, Instrument
@@ -141,15 +143,15 @@ def from_arrays(
     phi: ArrayLike = np.pi,
     phi_i: ArrayLike = 0.0,
     sigma: ArrayLike | None = None,
-    channels: tuple[str, ...] | None = None,
+    channels: Sequence[str] | None = None,
     source: str = "array",
     instrument: Instrument = IDEAL,
 ) -> Measurements:
     """Measurements from angles in **radians** and BRDF values in sr⁻¹, for use in a notebook or a simulation.
 
     Args:
-        theta_i: Zenith angles of incidence, (n,).
-        theta_o: Zenith angles of reflection, (n,); with the default phi, positive = mirror side.
+        theta_i: Zenith angles of incidence, (n,), 0 to π/2.
+        theta_o: Zenith angles of reflection, (n,), −π/2 to π/2; with the default phi, positive = mirror side.
         value: BRDF, (n,) or (n, c).
         phi: Relative azimuth φ_o − φ_i, (n,) or one number; π is the mirror side.
         phi_i: Azimuth of incidence, (n,) or one number; of consequence for anisotropic and tilted samples only.
@@ -159,20 +161,22 @@ def from_arrays(
         instrument: What took them.
 
     Raises:
-        ReadError: lengths differ.
+        FitmatError: something is not numbers, an angle is out of range, as in degrees, or lengths differ.
 
     Example:
         >>> from_arrays([0.5, 0.5], [-0.5, 0.5], [0.1, 0.3]).n_samples
         2
     """
-    given = (np.asarray(a, float) for a in (theta_i, theta_o, phi, phi_i))
-    theta_i, theta_o, phi, phi_i = np.broadcast_arrays(*given)
-    value = np.atleast_2d(np.asarray(value, float).T).T
-    if theta_i.ndim != 1 or len(value) != len(theta_i):
-        raise ReadError(f"{source}: {len(value)} values for angles of shape {theta_i.shape}: expected (n,) each.")
+    arguments.kind("source", source, str)
+    arguments.kind("instrument", instrument, Instrument)
+    theta_i, theta_o, phi, phi_i = _angles(source, theta_i, theta_o, phi, phi_i)
+    value = np.atleast_2d(arguments.numbers("value", value).T).T
+    if value.ndim != 2 or theta_i.ndim != 1 or len(value) != len(theta_i):
+        got = f"{source}: values of shape {value.shape} for angles of shape {theta_i.shape}"
+        raise ReadError(f"{got}, expected (n,) or (n, c) for (n,).")
     if sigma is not None:
-        sigma = np.broadcast_to(np.atleast_2d(np.asarray(sigma, float).T).T, value.shape)
-    channels = channels or default_channels(value.shape[1])
+        sigma = _sigma(source, sigma, value.shape)
+    channels = _names(source, channels, value.shape[1])
     placed = np.isfinite(theta_i) & np.isfinite(theta_o) & np.isfinite(phi) & np.isfinite(phi_i)
     theta_i, theta_o, phi, phi_i = (np.where(placed, angle, 0.0) for angle in (theta_i, theta_o, phi, phi_i))
     phi_o = phi_i + phi + np.where(theta_o < 0, np.pi, 0.0)
@@ -192,6 +196,41 @@ def from_arrays(
         masked={reason: count for reason, count in masked.items() if count},
         instrument=instrument,
     )
+
+
+def _angles(
+    source: str, theta_i: ArrayLike, theta_o: ArrayLike, phi: ArrayLike, phi_i: ArrayLike
+) -> tuple[np.ndarray, ...]:
+    """The four in radians, as long as one another."""
+    given = (
+        arguments.angles("theta_i", theta_i, arguments.ZENITH, missing=True),
+        arguments.angles("theta_o", theta_o, arguments.ZENITH, signed=True, missing=True),
+        arguments.angles("phi", phi, arguments.AZIMUTH, signed=True, missing=True),
+        arguments.angles("phi_i", phi_i, arguments.AZIMUTH, signed=True, missing=True),
+    )
+    try:
+        return np.broadcast_arrays(*given)
+    except ValueError:
+        shapes = ", ".join(str(angle.shape) for angle in given)
+        raise ReadError(f"{source}: theta_i, theta_o, phi, phi_i of shapes {shapes}, expected (n,) or one.") from None
+
+
+def _sigma(source: str, given: ArrayLike, shape: tuple[int, ...]) -> np.ndarray:
+    sigma = np.atleast_2d(arguments.numbers("sigma", given).T).T
+    if sigma.ndim > 2 or any(found not in (1, wanted) for found, wanted in zip(sigma.shape, shape, strict=True)):
+        raise ReadError(f"{source}: sigma of shape {sigma.shape} for values of shape {shape}, expected the same.")
+    return np.broadcast_to(sigma, shape)
+
+
+def _names(source: str, given: Sequence[str] | None, count: int) -> tuple[str, ...]:
+    if given is None:
+        return default_channels(count)
+    arguments.kind("channels", given, tuple, list)
+    for name in given:
+        arguments.kind("a name in channels", name, str)
+    if len(given) != count or len(set(given)) != count:
+        raise ReadError(f"{source}: channels {', '.join(given)}, expected {count} different names.")
+    return tuple(given)
 
 
 def default_channels(count: int) -> tuple[str, ...]:

@@ -8,6 +8,8 @@ import dataclasses
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
+from fitmat import arguments
+from fitmat.errors import ModelError
 from fitmat.maths.quadrature import AZIMUTH_NODES, ZENITH_NODES, incidence_rule, lobe_rule
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector
@@ -51,14 +53,24 @@ def albedo(model: AbstractBRDF, theta_i: ArrayLike | None = None, phi_i: ArrayLi
     Returns:
         The albedo with its error bound: about 10⁻³ (relative) for lobes down to α = 10⁻³ and θ_i up to 80°.
 
+    Raises:
+        FitmatError: no model, angles out of range, as in degrees, or of unlike shapes.
+
     Example:
         >>> import fitmat as fm
         >>> albedo(fm.model("lambert", kd=0.5), [0.0, 1.0]).value.round(3).ravel()
         array([0.5, 0.5])
     """
+    arguments.kind("model", model, AbstractBRDF)
+    phi = arguments.angles("phi_i", phi_i, arguments.AZIMUTH, signed=True)
     if theta_i is None:
+        if phi.any():
+            raise ModelError("phi_i without theta_i: light from everywhere has no azimuth. Give both, or neither.")
         return _from_everywhere(model)
-    theta, phi = np.broadcast_arrays(np.atleast_1d(np.asarray(theta_i, float)), np.asarray(phi_i, float))
+    theta = np.atleast_1d(arguments.angles("theta_i", theta_i, arguments.ZENITH))
+    if theta.ndim != 1 or phi.shape not in ((), (1,), theta.shape) or not theta.size:
+        raise ModelError(f"theta_i and phi_i have shapes {theta.shape} and {phi.shape}: expected the same (k,), k ≥ 1.")
+    theta, phi = np.broadcast_arrays(theta, phi)
     part = model, vector(model)[None]
     fine, coarse = (_albedo(part, float(widths(*part)[0]), (theta, phi), nodes) for nodes in (FINE, COARSE))
     return Albedo(fine, 2.0 * np.abs(fine - coarse) + LEAST)

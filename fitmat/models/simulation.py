@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fitmat import arguments
 from fitmat.errors import FitmatError, ModelError
 from fitmat.maths.directions import from_angles
 from fitmat.measurements.instrument import IDEAL, Instrument
@@ -55,8 +56,8 @@ def simulate(
         n = d·a·c·b samples, theta_o running fastest; a sample of σ = 0 among others is masked.
 
     Raises:
-        FitmatError: the model holds 32-bit floats.
-        ModelError: an angle or a noise is out of range, or the names are not as many as the model's channels.
+        FitmatError: the model holds 32-bit floats, or an angle, as in degrees, a noise or the seed is out of range.
+        ModelError: the names are not as many as the model's channels.
 
     Example:
         >>> import jax
@@ -66,13 +67,15 @@ def simulate(
         >>> simulate(gloss, [0.5, 1.0], [-0.5, 0.5, 1.0], relative_noise=0.02, absolute_noise=1e-3, seed=1).n_samples
         6
     """
-    grid = np.meshgrid(phi_i, theta_i, phi, theta_o, indexing="ij")
-    turn, light, relative, sensor = (np.ravel(angle) for angle in grid)
-    _refuse_single_precision(truth)
-    for name, angle in {"theta_i": light, "|theta_o|": np.abs(sensor)}.items():
-        _refuse_outside(name, angle, np.pi / 2, "0 to π/2 radians. Are the angles in degrees?")
+    arguments.kind("truth", truth, AbstractBRDF)
+    arguments.kind("instrument", instrument, Instrument)
+    arguments.whole("seed", seed)
     for name, noise in {"relative_noise": relative_noise, "absolute_noise": absolute_noise}.items():
-        _refuse_outside(name, noise, np.inf, "a finite number of at least 0")
+        arguments.numbers(name, noise, 0.0, single=True)
+    if instrument.dark is None:
+        raise ModelError("dark = None of the instrument (--dark fit), expected a number: there is nothing to fit yet.")
+    turn, light, relative, sensor = _grid(theta_i, theta_o, phi, phi_i)
+    _refuse_single_precision(truth)
     wi, wo = from_angles(light, turn), from_angles(np.abs(sensor), turn + relative + np.where(sensor < 0, np.pi, 0.0))
     rng = np.random.default_rng(seed)
     scale = jnp.exp(instrument.calibration * rng.normal()) if instrument.calibration else None
@@ -90,14 +93,19 @@ def simulate(
     return dataclasses.replace(measured, instrument=instrument)
 
 
+def _grid(theta_i: ArrayLike, theta_o: ArrayLike, phi: ArrayLike, phi_i: ArrayLike) -> list[np.ndarray]:
+    """phi_i, theta_i, phi and theta_o at every combination, theta_o fastest."""
+    axes = (
+        arguments.angles("phi_i", phi_i, arguments.AZIMUTH, signed=True),
+        arguments.angles("theta_i", theta_i, arguments.ZENITH),
+        arguments.angles("phi", phi, arguments.AZIMUTH, signed=True),
+        arguments.angles("theta_o", theta_o, arguments.ZENITH, signed=True),
+    )
+    return [np.ravel(angle) for angle in np.meshgrid(*axes, indexing="ij")]
+
+
 def _refuse_single_precision(truth: AbstractBRDF) -> None:
     if vector(truth).dtype != np.float64:
         raise FitmatError(
             'fitmat needs 64-bit floats: run jax.config.update("jax_enable_x64", True) before building the model.'
         )
-
-
-def _refuse_outside(name: str, values: ArrayLike, upper: float, expected: str) -> None:
-    values = np.ravel(np.asarray(values, float))
-    for value in values[~(np.isfinite(values) & (values >= 0) & (values <= upper))][:1]:
-        raise ModelError(f"{name} = {value:g}: expected {expected}.")

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 from selection import always
 
-from fitmat.errors import FitmatError, ModelError, OutputError
+from fitmat.errors import FitmatError, OutputError
 from fitmat.files import write_text
 from fitmat.fitting.fitting import fit
 from fitmat.fitting.result import Fit
 from fitmat.measurements.formats import csv
+from fitmat.measurements.instrument import Instrument
 from fitmat.measurements.reader import read
 from fitmat.measurements.samples import from_arrays
 from fitmat.models.base import AbstractBRDF, evaluate
@@ -155,11 +156,14 @@ def test_sigma_and_channels_are_as_asked() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"relative_noise": -0.1}, r"relative_noise = -0\.1: expected a finite number of at least 0\."),
-        ({"absolute_noise": np.nan}, r"absolute_noise = nan: expected a finite number of at least 0\."),
-        ({"theta_i": [30.0]}, r"theta_i = 30: expected 0 to π/2 radians\. Are the angles in degrees\?"),
+        ({"relative_noise": -0.1}, r"relative_noise is -0\.1, expected a number of at least 0\."),
+        ({"absolute_noise": np.nan}, r"absolute_noise is nan, expected a number of at least 0\."),
+        ({"theta_i": [30.0]}, r"theta_i = 30: expected 0 to π/2 radians\. Are the angles in degrees \(np\.deg2rad\)\?"),
         ({"theta_i": [-0.1]}, r"theta_i = -0\.1: expected 0 to π/2 radians"),
-        ({"theta_o": [0.1, -30.0]}, r"\|theta_o\| = 30: expected 0 to π/2 radians"),
+        ({"theta_o": [0.1, -30.0]}, r"theta_o = -30: expected −π/2 to π/2 radians"),
+        ({"theta_i": [np.nan]}, "theta_i = nan: expected 0 to π/2 radians"),
+        ({"phi": 180.0}, r"phi = 180: expected −2π to 2π radians\. Are the angles in degrees"),
+        ({"instrument": Instrument(dark=None)}, r"dark = None of the instrument \(--dark fit\), expected a number"),
         ({"channels": ("r", "g", "b")}, r"3 channel names, expected 1, one for each of the model's\."),
     ],
 )
@@ -172,7 +176,7 @@ def test_wrong_input_is_refused(change: dict[str, Any], message: str) -> None:
         "seed": 1,
         **change,
     }
-    with pytest.raises(ModelError, match=message):
+    with pytest.raises(FitmatError, match=message):
         simulate(gloss(), **given)
 
 
