@@ -3,9 +3,8 @@
 It knows no class of fitmat but by name, and judges no number beyond its range.
 """
 
-import os
 from collections.abc import Callable, Iterable, Mapping
-from numbers import Integral
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -26,13 +25,17 @@ _WHENCE = {
     "Match": "a Match, from fitmat.compare",
     "Study": "a Study, from fitmat.study",
     "AbstractBRDF": "a model, from fitmat.model",
+    "Surface": "a Surface, from fitmat.Surface",
+    "Instrument": "an Instrument, from fitmat.Instrument",
+    "AbstractFresnel": "a Fresnel term",
+    "Sequence": "a list",
+    "Findings": "one of the findings of a Study",
     "Choice": "a Choice, from fitmat.choose",
     "Design": "a Design, from fitmat.next_angles",
     "Examination": "an Examination, from fitmat.examine",
     "Stream": "a large file",
     "str": "a text",
-    "Real": "a number",
-    "bool": "True or False",
+    "Path": "a pathlib.Path",
     "Mapping": "a dict by name",
     "PathLike": "a path",
 }
@@ -56,15 +59,17 @@ def kind(name: str, given: object, *classes: type, optional: bool = False) -> No
         refuse(name, given, ", or ".join([*wanted, *(["None"] if optional else [])]))
 
 
-def path(name: str, given: object) -> None:
-    """Stop where an argument is no path; as `kind`."""
-    kind(name, given, str, os.PathLike)
-
-
 def function(name: str, given: object) -> None:
     """Stop where an argument is neither None nor something to call; as `kind`."""
     if not (given is None or callable(given)):
         refuse(name, given, "a function, or None")
+
+
+def flags(**given: object) -> None:
+    """Stop where an argument is neither True nor False, as "no" is not; as `kind`."""
+    for name, value in given.items():
+        if not isinstance(value, bool | np.bool_):
+            refuse(name, value, "True or False")
 
 
 def choice(name: str, given: object, choices: Iterable[str | None]) -> None:
@@ -82,11 +87,18 @@ def whole(name: str, given: object, least: int = 0, *, optional: bool = False) -
         refuse(name, given, f"a whole number of at least {least}")
 
 
-def named(name: str, given: object) -> None:
+def real(name: str, given: object, *, optional: bool = False) -> None:
+    """Stop where an argument is no real number; as `kind`."""
+    if (given is None and not optional) or not isinstance(given, Real | None) or isinstance(given, bool):
+        refuse(name, given, "a number")
+
+
+def named(**given: object) -> None:
     """Stop where an argument is neither None nor a dict whose keys are texts; as `kind`."""
-    kind(name, given, Mapping, optional=True)
-    for key in given if isinstance(given, Mapping) else ():
-        kind(f"a name in {name}", key, str)
+    for name, values in given.items():
+        kind(name, values, Mapping, optional=True)
+        for key in values if isinstance(values, Mapping) else ():
+            kind(f"a name in {name}", key, str)
 
 
 def numbers(

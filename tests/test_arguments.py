@@ -1,10 +1,18 @@
 """What public functions are given: units and wrong things are named at the door, before anything is computed."""
 
+import dataclasses
+import inspect
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
 import fitmat as fm
 from fitmat.errors import FitmatError
+from fitmat.models.base import AbstractBRDF
+from fitmat.models.terms.distributions import GGX
+from fitmat.models.terms.fresnel import White
 
 
 @pytest.mark.parametrize(
@@ -38,3 +46,264 @@ def test_what_is_masked_or_missing_is_masked() -> None:
     value = np.ma.array([1.0, 2.0, 3.0], mask=[False, True, False])
     assert fm.from_arrays(0.5, [0.1, 0.2, 0.3], value).valid[:, 0].tolist() == [True, False, True]
     assert fm.from_arrays(0.5, [0.1, np.nan, 0.3], [1.0, 2.0, None]).valid[:, 0].tolist() == [True, False, False]
+
+
+MEASURED = fm.from_arrays(0.5, [0.1, 0.2, 0.3], [1.0, 1.0, 1.0])
+LAMBERT = fm.model("lambert")
+SURFACE = fm.Surface(GGX(), (0.5, 0.5), White())
+FIT, POSTERIOR, STUDY = (object.__new__(one) for one in (fm.Fit, fm.Posterior, fm.Study))
+"""Of the right class and without content: nothing of it is read before the other arguments are looked at."""
+
+UP = [[0.0, 0.0, 1.0]]
+NOUN = (None, "lambert+ggx", Path("a.csv"), 3, np.nan, 1j, [], {}, np.zeros((2, 3)), LAMBERT, FIT, MEASURED, fm.Fit)
+WHOLE = (None, -1, 1.5, np.nan, "one", True, [1], 1j)
+NUMBERS = (None, "much", 1j, [[1.0], [1.0, 2.0]], {}, ["a"], True, FIT)
+NUMBER = (*NUMBERS, [0.1, 0.2], np.nan, -1.0)
+TEXT = (5, b"x", [], 1j, FIT, np.zeros(2))
+FLAG = (None, "no", 1, np.nan, [])
+NAMED = (5, "ks=1", [("ks", 1.0)], {1: 2.0}, np.zeros(2))
+CALLED = (5, "print", [])
+PATH = (None, 5, 1j, [], FIT)
+FOLDER = (5, "text", [], FIT)
+
+
+def without(values: tuple[Any, ...], *classes: type) -> tuple[Any, ...]:
+    """Wrong things but for those of some classes, which are right."""
+    return tuple(value for value in values if not isinstance(value, classes))
+
+
+NOTHING = type(None)
+VALUES: dict[str, Any] = {"relative_noise": 0.1, "absolute_noise": 0.0, "seed": 1}
+KNOWN: dict[str, tuple[Any, ...]] = {"fixed": (*NAMED, {"kd": "x"}), "priors": (*NAMED, {"kd": 5}, {"kd": (1, "x")})}
+
+DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
+    "read": (
+        {"source": {"theta_i": [1.0], "theta_o": [1.0], "brdf": [1.0]}},
+        {
+            "source": (None, 5, 1j, [], FIT, {"theta_i": 1.0}),
+            **dict.fromkeys(("quantity", "angle_unit", "where"), TEXT),
+            **dict.fromkeys(("intensity", "distance", "panel"), ("much", 1j, [], FIT)),
+            "columns": (5, 1j, [], FIT),
+            "forward": (None, *TEXT),
+            "specular_azimuth": (None, "a", 1.5, []),
+            "unknown_scale": FLAG,
+            "instrument": NOUN,
+        },
+    ),
+    "write": (
+        {"measurements": MEASURED, "path": "/proc/x.csv"},
+        {"measurements": without(NOUN, fm.Measurements), "path": PATH, "force": FLAG},
+    ),
+    "from_arrays": (
+        {"theta_i": 0.5, "theta_o": [0.5, 0.6], "value": [1.0, 1.0]},
+        {
+            **dict.fromkeys(
+                ("theta_i", "theta_o", "value", "phi", "phi_i"), (*NUMBERS, np.zeros((2, 2, 2)), [1.0] * 3)
+            ),
+            "sigma": (*without(NUMBERS, NOTHING), [1.0] * 3),
+            "channels": ("r", 5, ["r", "g"], [5], [None], ()),
+            "source": (None, *TEXT),
+            "instrument": NOUN,
+        },
+    ),
+    "Measurements": (
+        {f.name: getattr(MEASURED, f.name) for f in dataclasses.fields(MEASURED)},
+        {
+            **dict.fromkeys(("wi", "wo", "value", "valid"), (None, "x", 5, [], np.zeros(3), np.zeros((2, 1)), FIT)),
+            "sigma": ("x", 5, [], np.zeros(3), np.zeros((2, 1)), FIT),
+            "channels": (None, "r", 5, ("r", "g"), FIT),
+            "instrument": NOUN,
+        },
+    ),
+    "Instrument": (
+        {},
+        {**dict.fromkeys(("source", "receiver", "calibration"), NUMBER), "dark": without(NUMBER, NOTHING)},
+    ),
+    "examine": ({"measurements": MEASURED}, {"measurements": without(NOUN, fm.Measurements)}),
+    "simulate": (
+        {"truth": LAMBERT, "theta_i": 0.5, "theta_o": 0.5, **VALUES},
+        {
+            "truth": without(NOUN, AbstractBRDF),
+            **dict.fromkeys(("theta_i", "theta_o", "phi", "phi_i"), (*NUMBERS, np.nan)),
+            **dict.fromkeys(("relative_noise", "absolute_noise"), NUMBER),
+            "seed": WHOLE,
+            "give_sigma": FLAG,
+            "instrument": NOUN,
+        },
+    ),
+    "model": (
+        {"name": "lambert"},
+        {
+            "name": (None, *TEXT, "", "lambort"),
+            "masking": TEXT,
+            "channels": without((0, *WHOLE), NOTHING),
+            "kd": (*NUMBERS, np.zeros((2, 2)), np.nan, 1.5, -0.1),
+        },
+    ),
+    "every_model": ({}, {"measurements": without(NOUN, fm.Measurements, NOTHING)}),
+    "evaluate": (
+        {"model": LAMBERT, "wi": UP, "wo": UP},
+        {
+            "model": without(NOUN, AbstractBRDF),
+            **dict.fromkeys(("wi", "wo"), (*NUMBERS, 0.5, [0.5], [[1.0, 1.0, 1.0]])),
+        },
+    ),
+    "albedo": (
+        {"model": LAMBERT, "theta_i": 0.5},
+        {
+            "model": without(NOUN, AbstractBRDF),
+            "theta_i": (*without(NUMBERS, NOTHING), np.nan, [], np.zeros((2, 2))),
+            "phi_i": (*NUMBERS, np.nan, [0.1, 0.2]),
+        },
+    ),
+    "Surface": (
+        {"distribution": GGX(), "slopes": (0.5, 0.5), "fresnel": White()},
+        {
+            "distribution": (None, "ggx", GGX, 5),
+            "slopes": (None, 0.5, "a", (0.5,), ("a", "b"), (0.5, np.nan), (1j, 1j), (0.5, 45.0)),
+            "fresnel": (None, "schlick", White, 1.5),
+            "transmits": FLAG,
+        },
+    ),
+    **{
+        name: (
+            {"surface": SURFACE, "wi": UP, "samples": 100, "seed": 1} | ({} if name == "albedo_walk" else {"wo": UP}),
+            {
+                "surface": NOUN,
+                "wi": (*NUMBERS, 0.5, [0.5], [[1.0, 1.0, 1.0]]),
+                "samples": (0, 1, *WHOLE),
+                "seed": WHOLE,
+                **({} if name == "albedo_walk" else {"wo": (*NUMBERS, 0.5), "order": without((0, *WHOLE), NOTHING)}),
+            },
+        )
+        for name in ("evaluate_walk", "albedo_walk", "evaluate_slab")
+    },
+    "fit": (
+        {"measurements": MEASURED, "to": "lambert"},
+        {
+            "measurements": without(NOUN, fm.Measurements),
+            "to": (None, "lambort", 5, [], MEASURED),
+            **KNOWN,
+            "loss": (None, *TEXT, "lost"),
+            "masking": (*TEXT, "mask"),
+            "max_steps": (0, *WHOLE),
+        },
+    ),
+    "laplace": ({"fit": FIT, "seed": 1}, {"fit": without(NOUN, fm.Fit), "seed": WHOLE, "corrected": FLAG}),
+    "sample": (
+        {"fit": FIT, "seed": 1},
+        {
+            "fit": without(NOUN, fm.Fit),
+            "seed": WHOLE,
+            "walkers": without((0, *WHOLE), NOTHING),
+            "max_steps": (0, *WHOLE),
+            "progress": CALLED,
+            "checkpoint": FOLDER,
+        },
+    ),
+    "identify": ({}, {"posterior": NOUN}),
+    "choose": (
+        {"posteriors": [POSTERIOR]},
+        {"posteriors": (*NOUN, POSTERIOR, [FIT], [None]), "predicting": FLAG, "singly": FLAG},
+    ),
+    "check_predictions": ({"posterior": POSTERIOR, "seed": 1}, {"posterior": NOUN, "seed": WHOLE}),
+    "check_posterior": (
+        {"posterior": POSTERIOR, "seed": 1},
+        {"posterior": NOUN, "seed": WHOLE, **dict.fromkeys(("chains", "warmup", "count"), (0, *WHOLE))},
+    ),
+    "calibrate": (
+        {"name": "lambert", "geometry": MEASURED, "noise": (0.1, 0.1), "priors": {}, "simulations": 1, "seed": 1},
+        {
+            "name": (None, *TEXT, "lambort"),
+            "geometry": without(NOUN, fm.Measurements),
+            "noise": (*NUMBERS, 0.1, (0.1,), (-0.1, 0.1)),
+            "priors": (None, *KNOWN["priors"]),
+            "simulations": (0, *WHOLE),
+            "seed": WHOLE,
+            "method": (None, *TEXT, "nuts"),
+            "told": NUMBER,
+            "progress": CALLED,
+        },
+    ),
+    "next_angles": (
+        {"posterior": POSTERIOR},
+        {
+            "posterior": NOUN,
+            "target": TEXT,
+            "against": without(NOUN, NOTHING),
+            "kind": (None, *TEXT, "curves"),
+            "count": (0, *WHOLE),
+            "repeats": (0, *WHOLE),
+            "limits": (5, {}, 1j, "60"),
+        },
+    ),
+    "compare": (
+        {"one": POSTERIOR, "other": POSTERIOR},
+        {"one": NOUN, "other": NOUN, **dict.fromkeys(("spheres", "imitations", "pictures"), FLAG)},
+    ),
+    "imitate": (
+        {"what": LAMBERT, "into": "lambert"},
+        {
+            "what": without(NOUN, AbstractBRDF, fm.Fit),
+            "into": (None, "lambort", 5, [], MEASURED),
+            "metric": (None, *TEXT, "far"),
+            "fixed": KNOWN["fixed"],
+        },
+    ),
+    "study": (
+        {"measurements": MEASURED, "models": "lambert"},
+        {
+            "measurements": without(NOUN, fm.Measurements),
+            "models": (None, 5, 1j, [], [5], "lambort", FIT),
+            **KNOWN,
+            "loss": (None, *TEXT, "lost"),
+            "masking": (*TEXT, "mask"),
+            "ior": (*TEXT, "Unobtainium"),
+            **dict.fromkeys(("tilt", "sampling", "second_opinion", "full"), FLAG),
+            "seed": WHOLE,
+            "resume": FOLDER,
+            "progress": CALLED,
+        },
+    ),
+    "report": ({"study": STUDY, "folder": "/proc/x"}, {"study": NOUN, "folder": PATH, "force": FLAG}),
+}
+"""Public name → arguments that are right, and for each argument what is not."""
+
+UNCHECKED = {"source", "masked", "notes", "channels"}
+"""What only words are made of; and names of channels, which are looked at once there are values."""
+
+RESULTS = {"Fit", "Posterior", "Match", "Study"}
+"""Classes that fitmat makes and users do not."""
+
+WRONG = [
+    (name, key, k) for name, (_, wrong) in DOORS.items() for key, values in wrong.items() for k in range(len(values))
+]
+
+
+@pytest.mark.parametrize(("name", "key", "k"), WRONG)
+def test_wrong_things_are_named_at_the_door(name: str, key: str, k: int) -> None:
+    """A sentence that says what was expected, not a traceback from the depths; nothing is fitted or compiled."""
+    right, wrong = DOORS[name]
+    with pytest.raises(
+        FitmatError,
+        match=r"expected|needs GGX|no fit is finite|is not known|no lobe|unknown loss|no model given|none of lambert",
+    ):
+        getattr(fm, name)(**right | {key: wrong[key][k]})
+
+
+def test_every_public_name_has_its_door() -> None:
+    assert DOORS.keys() | RESULTS | {"FitmatError", "plot"} == set(dir(fm))
+    for name, (_, wrong) in DOORS.items():
+        asked = set(inspect.signature(getattr(fm, name)).parameters) - UNCHECKED - {"values"}
+        assert asked <= wrong.keys(), name
+
+
+def test_every_picture_asks_for_its_thing() -> None:
+    shown = [one for one in vars(fm.plot).values() if inspect.isfunction(one) and one.__module__.endswith("plots")]
+    shown += [one for one in vars(fm.plot).values() if inspect.isfunction(one) and one.__module__.endswith("plot")]
+    pictures = [one for one in shown if not one.__name__.startswith("_")]
+    assert len(pictures) >= 14
+    for picture in pictures:
+        for wrong in NOUN:
+            with pytest.raises(FitmatError, match="expected"):
+                picture(wrong)

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike
 
+from fitmat import arguments
 from fitmat.errors import FitmatError, ModelError
 from fitmat.fitting.coordinates import Coordinates, coordinates
 from fitmat.fitting.likelihood import (
@@ -101,6 +102,8 @@ def fit(
         raise FitmatError(
             'fitmat needs 64-bit floats: run jax.config.update("jax_enable_x64", True) before building arrays.'
         )
+    _refuse_kinds(measurements, to, fixed, priors)
+    arguments.whole("max_steps", max_steps, 1)
     channels = len(measurements.channels)
     if masking is not None and not isinstance(to, str):
         raise ModelError(
@@ -137,6 +140,12 @@ def fit(
     return conclude(measurements, shown, held, (found_noise, data), ends)
 
 
+def _refuse_kinds(measurements: object, to: object, fixed: object, priors: object) -> None:
+    arguments.kind("measurements", measurements, Measurements)
+    arguments.kind("to", to, str, AbstractBRDF)
+    arguments.named(fixed=fixed, priors=priors)
+
+
 def _seen(template: AbstractBRDF, m: Measurements) -> AbstractBRDF:
     """The model as the measurements' instrument shows it, with what is to be fitted of the instrument at its start."""
     if m.instrument.ideal:
@@ -164,7 +173,7 @@ def _held(template: AbstractBRDF, fixed: Mapping[str, ArrayLike]) -> dict[str, n
     for name, value in fixed.items():
         if name not in sizes:
             raise ModelError(f"cannot fix {name!r}: {template.name} has {', '.join(sizes)}.")
-        given = np.atleast_1d(np.asarray(value, float))
+        given = np.atleast_1d(arguments.numbers(f"fixed {name}", value))
         if given.shape not in ((1,), (sizes[name].size,)):
             raise ModelError(f"fixed {name} has {given.size} values: expected 1 or {sizes[name].size}.")
         values[sizes[name].place] = given

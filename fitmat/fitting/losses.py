@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from fitmat import arguments
 from fitmat.errors import ModelError
 from fitmat.fitting.stabilising import spread, stabilised
 from fitmat.maths.arrays import library
@@ -247,6 +248,7 @@ def loss(name: str) -> Loss:
     Raises:
         ModelError: there is none of that name.
     """
+    arguments.kind("loss", name, str)
     known = ALIASES.get(name.lower(), name.lower())
     if known not in LOSSES:
         raise ModelError(f"unknown loss {name!r}: choose from {', '.join(LOSSES)}.")

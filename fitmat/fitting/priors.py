@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
+from fitmat import arguments
 from fitmat.errors import ModelError
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.likelihood import Prior
@@ -43,7 +44,8 @@ def prepare_prior(
     discrepancy = 0.0
     if instrument.calibration:
         precision[places["scale"].place] = 1.0 / instrument.calibration
-    for name, (centre, sd) in given.items():
+    for name, pair in given.items():
+        centre, sd = _pair(name, pair)
         if name == DISCREPANCY:
             _refuse_centre(centre)
             discrepancy = 1.0 / _positive(name, sd).item()
@@ -82,6 +84,13 @@ def refuse_idle(given: Container[str], fixed: Iterable[str], loss: Loss) -> None
         raise ModelError(
             f"prior of {DISCREPANCY} (--prior) under the loss {loss.name} (--loss), {expected}. Leave one out."
         )
+
+
+def _pair(name: str, given: Any) -> tuple[np.ndarray, np.ndarray]:
+    if not isinstance(given, Sequence | np.ndarray) or isinstance(given, str) or len(given) != 2:
+        arguments.refuse(f"prior of {name}", given, "a centre and a standard deviation, as (1.5, 0.05)")
+    centre, sd = (arguments.numbers(f"prior of {name}", part) for part in given)
+    return centre, sd
 
 
 def _refuse_centre(centre: ArrayLike) -> None:

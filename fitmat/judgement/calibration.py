@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import ArrayLike, Bool, Float, Int
 
+from fitmat import arguments
 from fitmat._types import Progress
 from fitmat.errors import FitmatError
 from fitmat.fitting.coordinates import coordinates
@@ -142,11 +143,19 @@ def calibrate(
     Raises:
         FitmatError: the discrepancy has no prior, or a fit is not finite.
     """
+    arguments.kind("geometry", geometry, Measurements)
+    arguments.kind("priors", priors, Mapping)
+    arguments.named(priors=priors)
+    arguments.whole("simulations", simulations, 1)
+    arguments.whole("seed", seed)
+    arguments.choice("method", method, ("laplace", "emcee"))
+    arguments.function("progress", progress)
+    _refuse_noise(noise, told)
     rng = np.random.default_rng(seed)
-    template = _centre(model(name, channels=len(geometry.channels)), priors)
+    flat = model(name, channels=len(geometry.channels))
+    prior, template = prepare_prior(flat, IDEAL, priors), _centre(flat, priors)
     sigma = np.hypot(noise[1], noise[0] * evaluate(template, geometry.wi, geometry.wo))
-    free, prior = coordinates(template).index, prepare_prior(template, IDEAL, priors)
-    truths, s = draw(template, prior, free, simulations, rng)
+    truths, s = draw(template, prior, coordinates(template).index, simulations, rng)
     kappa, normal = geometry.wi[:, 2:3], rng.normal(size=(simulations, *sigma.shape))
     exact = values(template, truths, geometry.wi, geometry.wo) * kappa
     measured = replicated(exact, sigma * kappa, s[:, None, None], normal) / kappa
@@ -165,6 +174,12 @@ def calibrate(
             progress(f"calibrating {name}", k + 1, simulations)
     ranks, covered, trusted = (np.stack(part) for part in zip(*found, strict=True))
     return Calibration(name, method, _quantities(template), ranks, covered, trusted)
+
+
+def _refuse_noise(noise: object, told: object) -> None:
+    if arguments.numbers("noise", noise, 0.0).shape != (2,):
+        arguments.refuse("noise", noise, "two numbers: a fraction, and a floor in sr⁻¹")
+    arguments.numbers("told", told, 0.0, single=True)
 
 
 def join(parts: Sequence[Calibration]) -> Calibration:

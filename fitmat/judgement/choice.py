@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from fitmat import arguments
 from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
 from fitmat.judgement.evidence import Evidence, weigh
@@ -180,6 +181,7 @@ def every_model(measurements: Measurements | None = None) -> tuple[str, ...]:
         measurements: What will be fitted; None for all.
     """
     m = measurements
+    arguments.kind("measurements", m, Measurements, optional=True)
     turned = m is None or not bool(m.in_plane.all()) or bool(np.ptp(m.phi_i) > 0)
     names = []
     for name, lobe in LOBES.items():
@@ -206,6 +208,10 @@ def choose(posteriors: Sequence[Posterior], *, predicting: bool = True, singly: 
     Raises:
         FitmatError: nothing is finite, or fits differ in measurements or loss.
     """
+    arguments.kind("posteriors", posteriors, Sequence)
+    arguments.flags(predicting=predicting, singly=singly)
+    for posterior in posteriors:
+        arguments.kind("one of posteriors", posterior, Posterior)
     usable = [p for p in posteriors if p.fit.finite]
     if not usable:
         raise FitmatError("no fit is finite, there is nothing to choose from; check the data.")

@@ -7,6 +7,7 @@ import dataclasses
 
 import numpy as np
 
+from fitmat import arguments
 from fitmat.errors import FitmatError
 from fitmat.fitting.likelihood import misfits
 from fitmat.fitting.losses import DEFAULT
@@ -108,6 +109,8 @@ def check_predictions(posterior: Posterior, *, seed: int) -> PredictiveCheck:
     Raises:
         FitmatError: the fit is not finite, or its loss is no such likelihood.
     """
+    arguments.kind("posterior", posterior, Posterior)
+    arguments.whole("seed", seed)
     fit = posterior.fit
     if not fit.finite:
         raise FitmatError(f"{fit.name}: the fit ended {fit.result}, there is nothing to check; check the data.")

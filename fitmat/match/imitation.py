@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
+from fitmat import arguments
 from fitmat.errors import FitmatError
 from fitmat.fitting.coordinates import Coordinates, coordinates
 from fitmat.fitting.fitting import STEADY
@@ -104,8 +105,10 @@ def imitate(
         >>> imitate(fm.model("lambert+ggx", alpha=0.1), "lambert+blinn-phong").parameters["exponent"]  # doctest: +SKIP
         array([138.2])
     """
-    if metric not in LEAST_SQUARES:
-        raise FitmatError(f"metric {metric!r}: expected one of {', '.join(LEAST_SQUARES)}.")
+    arguments.kind("what", what, AbstractBRDF, Fit)
+    arguments.kind("into", into, str, AbstractBRDF)
+    arguments.named(fixed=fixed)
+    arguments.choice("metric", metric, LEAST_SQUARES)
     source = surface(what.model if isinstance(what, Fit) else what)
     template, moved = _template(source, into, dict(fixed or {}))
     rows = _rows(source, metric)
@@ -130,7 +133,10 @@ def _template(
     for name, value in held.items():
         if name not in places:
             raise FitmatError(f"cannot fix {name!r}: {template.name} has {', '.join(places)}.")
-        numbers[places[name]] = value
+        given = arguments.numbers(f"fixed {name}", value)
+        if given.shape not in ((), (1,), numbers[places[name]].shape):
+            raise FitmatError(f"fixed {name} has {given.size} values: expected 1 or {numbers[places[name]].size}.")
+        numbers[places[name]] = given
     template = with_vector(template, numbers)
     check_range(template)
     return template, coordinates(template, held)

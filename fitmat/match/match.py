@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from fitmat import arguments
 from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
 from fitmat.match import sentences
@@ -170,6 +171,11 @@ def compare(
         FitmatError: the two are not one empirical and one microfacet model, were fitted to different data, or are not
             finite.
     """
+    arguments.kind("one", one, Posterior)
+    arguments.kind("other", other, Posterior)
+    arguments.flags(spheres=spheres, imitations=imitations, pictures=pictures)
+    if pictures and not spheres:
+        raise FitmatError("pictures without spheres, expected spheres = True: they are what is drawn. Leave one out.")
     empirical, microfacet = (one, other) if is_empirical(one.fit.name) else (other, one)
     _refuse_unlike(empirical, microfacet)
     fits, models = (empirical.fit, microfacet.fit), (empirical.fit.model, microfacet.fit.model)

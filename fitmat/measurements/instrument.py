@@ -4,7 +4,6 @@ A description only; `models.around.instrument` is the model that follows from it
 """
 
 import dataclasses
-from numbers import Real
 
 import numpy as np
 
@@ -43,7 +42,7 @@ class Instrument:
             value = getattr(self, name)
             if value is None and name == "dark":
                 continue
-            arguments.kind(f"{name} of the instrument", value, Real)
+            arguments.real(f"{name} of the instrument", value)
             if not (np.isfinite(value) and 0 <= value <= upper):
                 unit = " radians (half-angle); is it in degrees (np.deg2rad)?" if upper == WIDEST else ". Correct it."
                 raise ReadError(f"{name} = {value:g} of the instrument, expected 0 to {upper:.4g}{unit}")

@@ -5,6 +5,7 @@ They hold no default that would change a value in silence.
 
 import dataclasses
 
+from fitmat import arguments
 from fitmat.errors import ReadError
 from fitmat.measurements.lighting import PointSource
 
@@ -44,6 +45,7 @@ class Options:
     unknown_scale: bool = False
 
     def __post_init__(self) -> None:
+        self._refuse_kinds()
         for name, choices in ALLOWED.items():
             given = getattr(self, name)
             if given not in choices:
@@ -60,6 +62,14 @@ class Options:
         if self.panel is not None and not 0 < self.panel <= 2:
             expected = "expected its reflectance factor, 0 to 2 (Spectralon: 0.99)"
             raise ReadError(f"panel = {self.panel:g} (--panel), {expected}. Correct it.")
+
+    def _refuse_kinds(self) -> None:
+        for name in ("quantity", "angle_unit", "forward", "where"):
+            arguments.kind(name, getattr(self, name), str, optional=name != "forward")
+        for name in ("intensity", "distance", "panel"):
+            arguments.real(name, getattr(self, name), optional=True)
+        arguments.whole("specular_azimuth", self.specular_azimuth)
+        arguments.flags(unknown_scale=self.unknown_scale)
 
     @property
     def source(self) -> PointSource | None:

@@ -11,6 +11,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import polars as pl
 
+from fitmat import arguments
 from fitmat.errors import ReadError
 from fitmat.measurements.blocked import without_blocked
 from fitmat.measurements.formats import alta, astm, fred, lighttools, merl, parquet, rgl, ssdd, utia, zemax
@@ -104,6 +105,8 @@ def read(
         >>> read({"theta_i": [30, 30], "theta_o": [-30, 30], "brf": [1.0, 2.0]}).value.round(2).T
         array([[0.32, 0.64]])
     """
+    arguments.kind("columns", columns, str, Mapping, optional=True)
+    arguments.kind("instrument", instrument, Instrument)
     options = Options(quantity, angle_unit, forward, specular_azimuth, intensity, distance, where, panel, unknown_scale)
     recording = _recording(source, columns, options)
     found = measured(recording, options)

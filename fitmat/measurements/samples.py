@@ -54,6 +54,19 @@ class Measurements:
     notes: tuple[str, ...] = ()
     instrument: Instrument = IDEAL
 
+    def __post_init__(self) -> None:
+        arguments.kind("channels", self.channels, tuple, list)
+        arguments.kind("instrument", self.instrument, Instrument)
+        count, columns = len(self.wi) if isinstance(self.wi, np.ndarray) else 0, len(self.channels)
+        shapes = {"wi": (count, 3), "wo": (count, 3), "value": (count, columns), "valid": (count, columns)}
+        for name, shape in (shapes | ({} if self.sigma is None else {"sigma": shapes["value"]})).items():
+            arguments.kind(name, given := getattr(self, name), np.ndarray)
+            if given.shape != shape:
+                got, columns = f"{name} of shape {given.shape}", f"{shape[1]} columns"
+                raise ReadError(
+                    f"{got}, expected {shape}: a row for each of wi, {columns}. fitmat.from_arrays makes them."
+                )
+
     @property
     def n_samples(self) -> int:
         """Rows, masked ones included."""

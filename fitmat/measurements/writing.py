@@ -9,6 +9,7 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+from fitmat import arguments
 from fitmat.errors import OutputError
 from fitmat.files import write_bytes
 from fitmat.measurements.samples import Measurements
@@ -33,6 +34,9 @@ def write(measurements: Measurements, path: str | os.PathLike[str], force: bool 
         OutputError: the suffix is unknown, the format cannot hold the measurements, the file exists and `force` is off,
             or the disk refuses.
     """
+    arguments.kind("measurements", measurements, Measurements)
+    arguments.kind("path", path, str, os.PathLike)
+    arguments.flags(force=force)
     target = Path(path)
     room = _room(target)
     if os.path.lexists(target) and not force:

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
+from fitmat import arguments
 from fitmat._types import Directions, Samples, Scalar, Spectrum, Vec3
 from fitmat.errors import ModelError
 from fitmat.maths.programs import program
@@ -156,6 +157,18 @@ def padded_length(count: int) -> int:
     return max(64, -(-count // step) * step)
 
 
+def direction_pairs(wi: ArrayLike, wo: ArrayLike) -> list[Float[np.ndarray, "n 3"]]:
+    """Both as arrays of numbers.
+
+    Raises:
+        FitmatError: they are no numbers, or not of the same shape (n, 3).
+    """
+    pair = [arguments.numbers(name, w) for name, w in (("wi", wi), ("wo", wo))]
+    if pair[0].shape != pair[1].shape or pair[0].ndim != 2 or pair[0].shape[1] != 3 or len(pair[0]) == 0:
+        raise ModelError(f"wi and wo have shapes {pair[0].shape} and {pair[1].shape}: expected the same (n, 3), n ≥ 1.")
+    return pair
+
+
 def evaluate(model: AbstractBRDF, wi: ArrayLike, wo: ArrayLike) -> Float[np.ndarray, "n c"]:
     """BRDF values in sr⁻¹ (no cosine) for n pairs of directions.
 
@@ -176,9 +189,8 @@ def evaluate(model: AbstractBRDF, wi: ArrayLike, wo: ArrayLike) -> Float[np.ndar
         >>> fm.evaluate(fm.model("lambert", kd=np.pi / 4), up, up)
         array([[0.25]])
     """
-    pair = [np.asarray(w, float) for w in (wi, wo)]
-    if pair[0].shape != pair[1].shape or pair[0].ndim != 2 or pair[0].shape[1] != 3 or len(pair[0]) == 0:
-        raise ModelError(f"wi and wo have shapes {pair[0].shape} and {pair[1].shape}: expected the same (n, 3), n ≥ 1.")
+    arguments.kind("model", model, AbstractBRDF)
+    pair = direction_pairs(wi, wo)
     for label, w in zip(("wi", "wo"), pair, strict=True):
         length = np.linalg.norm(w, axis=1)
         if not np.allclose(length, 1.0, atol=1e-6):

@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from fitmat import arguments
 from fitmat.errors import ModelError
 from fitmat.maths.arrays import library
 
@@ -74,7 +75,12 @@ def as_parameter(value: Any) -> Any:
     """A number, or one number per channel, as a floating-point array: JAX's inside a program, else NumPy's."""
     if value is None or isinstance(value, str | bytes | bool):
         raise ModelError(f"parameter value {value!r}: expected a number or one number per channel.")
-    return jnp.asarray(value, float) if isinstance(value, jax.Array) else np.asarray(value, float)
+    if isinstance(value, jax.Array):
+        return jnp.asarray(value, float)
+    found = arguments.numbers("parameter value", value)
+    if found.ndim > 1:
+        arguments.refuse("parameter value", value, "a number or one number per channel")
+    return found
 
 
 @dataclasses.dataclass(frozen=True)

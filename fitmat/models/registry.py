@@ -12,6 +12,7 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import ArrayLike
 
+from fitmat import arguments
 from fitmat.errors import ModelError
 from fitmat.models.around.coat import RoughCoat, SmoothCoat, Varnish
 from fitmat.models.around.plastic import Plastic
@@ -174,6 +175,7 @@ def normalised(name: str) -> str:
 
 def _parsed(name: str) -> tuple[list[str], list[str]]:
     """Covers, outermost first, and the lobes of the base."""
+    arguments.kind("name of a model", name, str)
     *covers, base = "".join(name.split()).lower().split(OVER)
     parts = base.split("+")
     known = {kind: [n for n, lobe in LOBES.items() if (lobe.kind == "cover") is kind] for kind in (True, False)}
@@ -214,6 +216,8 @@ def model(name: str, *, masking: str | None = None, channels: int | None = None,
         >>> fm.model("lambert+ggx", kd=0.3, alpha=0.2, eta=1.5).name
         'lambert+ggx'
     """
+    arguments.kind("masking", masking, str, optional=True)
+    arguments.whole("channels", channels, 1, optional=True)
     covers, parts = _parsed(name)
     lobes = covers + parts
     known = {key for part in lobes for key in LOBES[part].defaults()}

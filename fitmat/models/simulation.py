@@ -70,6 +70,7 @@ def simulate(
     arguments.kind("truth", truth, AbstractBRDF)
     arguments.kind("instrument", instrument, Instrument)
     arguments.whole("seed", seed)
+    arguments.flags(give_sigma=give_sigma)
     for name, noise in {"relative_noise": relative_noise, "absolute_noise": absolute_noise}.items():
         arguments.numbers(name, noise, 0.0, single=True)
     if instrument.dark is None:

@@ -3,8 +3,12 @@
 Nothing is drawn here.
 """
 
+from collections.abc import Sequence
+
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+from fitmat import arguments
 
 # Okabe & Ito's palette, safe for colour-blind readers.
 BLACK, ORANGE, BLUE, GREEN, PURPLE = "#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7"
@@ -14,6 +18,17 @@ FIT_COLOURS = (ORANGE, BLUE, GREEN, PURPLE)
 def plain(text: str) -> str:
     """A text in which Matplotlib finds no formula, for names that users choose."""
     return text.replace("$", r"\$")
+
+
+def check_channel(channel: object, names: Sequence[str]) -> None:
+    """Stop where there is no channel of that number.
+
+    Raises:
+        FitmatError: says how many there are.
+    """
+    arguments.whole("channel", channel)
+    if channel not in range(len(names)):
+        arguments.refuse("channel", channel, f"0 to {len(names) - 1}: {', '.join(names)}")
 
 
 def new_axes(width: float = 5.0, height: float = 3.6) -> Axes:

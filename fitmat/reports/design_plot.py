@@ -6,6 +6,7 @@ It chooses nothing.
 import numpy as np
 from matplotlib.axes import Axes
 
+from fitmat import arguments
 from fitmat.judgement.design.design import Design
 from fitmat.reports.axes import BLACK, BLUE, GREEN, ORANGE, new_axes
 
@@ -17,6 +18,7 @@ def design(design: Design, ax: Axes | None = None) -> Axes:
         design: From `next_angles`; of curves the gain is drawn over the incidence.
         ax: Where to draw; a new figure if None.
     """
+    arguments.kind("design", design, Design)
     ax = ax or new_axes(5.6, 4.4)
     c, flat = design.candidates, np.abs(design.candidates.phi - np.pi) < 1e-6
     flat &= c.phi_i == c.phi_i[0]

@@ -12,10 +12,11 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure, SubFigure
 
+from fitmat import arguments
 from fitmat.judgement.examination.coverage import Incidence
 from fitmat.judgement.examination.examining import Examination
 from fitmat.judgement.examination.features import in_plane_curve
-from fitmat.reports.axes import plain
+from fitmat.reports.axes import check_channel, plain
 
 BESIDE = 4
 """So many maps stand in one row; more stand in rows of three."""
@@ -41,7 +42,10 @@ def examination(found: Examination, *, channel: int | None = None) -> Figure:
         found: From `examine`.
         channel: Which channel; the one with most valid samples if None.
     """
+    arguments.kind("found", found, Examination)
     m = found.measurements
+    if channel is not None:
+        check_channel(channel, m.channels)
     chosen = drawn(found)
     k = int(m.valid.sum(axis=0).argmax()) if channel is None else channel
     curves = [i for i in chosen if len(in_plane_curve(m, i, k)[0]) >= 3] if not found.coverage.scattered else []

@@ -6,6 +6,7 @@ Formats numbers that other rooms computed; computes none.
 import base64
 import io
 import json
+import os
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,7 @@ import jinja2
 import numpy as np
 from markupsafe import Markup
 
-from fitmat import files
+from fitmat import arguments, files
 from fitmat.fitting.result import RESULTS, Fit
 from fitmat.judgement.choice import Choice
 from fitmat.match.ablation import EXPLAINS, TERMS
@@ -61,6 +62,9 @@ def report(study: Study, folder: str | Path, *, force: bool = False) -> Path:
     Raises:
         OutputError: the folder holds something and `force` is off, or it cannot be written.
     """
+    arguments.kind("study", study, Study)
+    arguments.kind("folder", folder, str, os.PathLike)
+    arguments.flags(force=force)
     target = Path(folder)
     with files.new(target, force=force, stale=POSTERIOR.format("*")) as draft:
         write(draft, study)

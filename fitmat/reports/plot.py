@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from fitmat import arguments
 from fitmat.errors import FitmatError
 from fitmat.judgement.choice import SMALL, Choice
 from fitmat.match.ablation import Ablation
@@ -18,7 +19,7 @@ from fitmat.match.discernibility import SEPARATED, Telling
 from fitmat.match.match import Match
 from fitmat.match.regions import REGIONS
 from fitmat.maths.directions import signed_zenith
-from fitmat.reports.axes import BLACK, BLUE, FIT_COLOURS, GREEN, ORANGE, PURPLE, plain
+from fitmat.reports.axes import BLACK, BLUE, FIT_COLOURS, GREEN, ORANGE, PURPLE, check_channel, plain
 from fitmat.reports.axes import new_axes as new_axes
 from fitmat.reports.design_plot import design as design
 from fitmat.reports.examination_plots import examination as examination
@@ -35,6 +36,8 @@ DECADES = 1.5
 
 def curves(study: Study, *, channel: int = 0) -> Figure:
     """Measured points with every fit and its band, one panel for each section."""
+    arguments.kind("study", study, Study)
+    check_channel(channel, study.measurements.channels)
     along = range(len(study.findings[0].curves))
     columns = 2 if len(along) in (2, 4) else min(3, len(along))
     lines = -(-len(along) // columns)
@@ -58,6 +61,8 @@ def section(study: Study, which: int = 0, *, channel: int = 0, ax: Axes | None =
         channel: Which channel.
         ax: Where to draw; a new figure if None.
     """
+    arguments.kind("study", study, Study)
+    check_channel(channel, study.measurements.channels)
     ax = ax or new_axes()
     m, drawn = study.measurements, [found.curves[which] for found in study.findings]
     place = drawn[0].section
@@ -95,6 +100,7 @@ def _set_scale(ax: Axes, measured: np.ndarray, top: float) -> None:
 
 def residual_figure(study: Study, channels: Sequence[int] = (0,)) -> Figure:
     """Standardised residuals, one row for each channel, one column for each model."""
+    arguments.kind("study", study, Study)
     columns = len(study.findings)
     figure = Figure(figsize=(5.0 * columns, 3.0 * len(channels)), layout="constrained")
     for k, (channel, found) in enumerate(itertools.product(channels, study.findings)):
@@ -104,6 +110,8 @@ def residual_figure(study: Study, channels: Sequence[int] = (0,)) -> Figure:
 
 def residuals(found: Findings, *, channel: int = 0, ax: Axes | None = None) -> Axes:
     """Standardised residuals of one channel against theta_o, one colour per incidence angle."""
+    arguments.kind("found", found, Findings)
+    check_channel(channel, found.fit.measurements.channels)
     ax = ax or new_axes()
     fit, z = found.fit, found.residuals[:, channel]
     used = np.asarray(fit.data.weight)[:, channel] > 0
@@ -125,6 +133,7 @@ def residuals(found: Findings, *, channel: int = 0, ax: Axes | None = None) -> A
 
 def albedo(match: Match, ax: Axes | None = None) -> Axes:
     """Directional albedo of both models with 95 % bands, channel mean."""
+    arguments.kind("match", match, Match)
     ax = ax or new_axes()
     angle = np.rad2deg(match.albedo_theta_i)
     pairs = ((match.empirical, match.albedo_empirical), (match.microfacet, match.albedo_microfacet))
@@ -143,6 +152,7 @@ def albedo(match: Match, ax: Axes | None = None) -> Axes:
 
 def distances(match: Match, metric: str = "relative", ax: Axes | None = None) -> Axes:
     """Distance of the two models at each incidence, over all directions and in each region, with 95 % bands."""
+    arguments.kind("match", match, Match)
     ax = ax or new_axes()
     angle, found = np.rad2deg(match.distances.theta_i), match.distances
     parts = np.moveaxis(found.by_incidence_and_region[metric], 2, 0)
@@ -157,6 +167,7 @@ def distances(match: Match, metric: str = "relative", ax: Axes | None = None) ->
 
 def ablation(ablation: Ablation, ax: Axes | None = None) -> Axes:
     """By how much the distance falls at each incidence without each term of the microfacet lobe, with 95 % bands."""
+    arguments.kind("ablation", ablation, Ablation)
     ax = ax or new_axes()
     angle = np.rad2deg(ablation.theta_i)
     for (term, fall), colour in zip(ablation.fall.items(), (BLUE, GREEN, PURPLE, BLACK), strict=True):
@@ -169,6 +180,7 @@ def ablation(ablation: Ablation, ax: Axes | None = None) -> Axes:
 
 def telling(telling: Telling, ax: Axes | None = None) -> Axes:
     """The difference of the models in standard deviations, of a reading and of all readings at each incidence."""
+    arguments.kind("telling", telling, Telling)
     ax = ax or new_axes()
     kinds = (telling.rms, ORANGE, "a single reading", 1.0), (telling.separation, BLUE, "all readings", SEPARATED)
     for band, colour, name, limit in kinds:
@@ -187,6 +199,7 @@ def _against_incidence(ax: Axes, label: str) -> Axes:
 
 def choice(choice: Choice, ax: Axes | None = None) -> Axes:
     """How far each model is behind the best in elpd, with standard errors; grey: too close to call."""
+    arguments.kind("choice", choice, Choice)
     candidates = choice.candidates
     ax = ax or new_axes(6.4, 0.9 + 0.3 * len(candidates))
     for k, c in enumerate(candidates):
@@ -207,6 +220,7 @@ def choice(choice: Choice, ax: Axes | None = None) -> Axes:
 
 def left_out(choice: Choice, *, most: int = 4, ax: Axes | None = None) -> Axes:
     """Prediction errors of incidences that were left out, for the `most` best models that were refitted."""
+    arguments.kind("choice", choice, Choice)
     ax = ax or new_axes()
     shown = sorted([c for c in choice.candidates if c.left_out is not None][:most], key=lambda c: c.name)
     for c, colour, marker in zip(shown, FIT_COLOURS, "os^D", strict=False):
@@ -222,6 +236,7 @@ def left_out(choice: Choice, *, most: int = 4, ax: Axes | None = None) -> Axes:
 
 def spheres(perceived: Perceived) -> Figure:
     """Both models' spheres, and below them where an eye sees a difference; one column for each lighting."""
+    arguments.kind("perceived", perceived, Perceived)
     drawn = [lighting.pictures for lighting in perceived.lightings]
     if any(pictures is None for pictures in drawn):
         raise FitmatError("there are no pictures of the spheres: ask for them, fitmat.compare(…, pictures=True).")
@@ -251,6 +266,7 @@ def spheres(perceived: Perceived) -> Figure:
 
 def corner(posterior: Posterior) -> Figure:
     """Every free parameter against every other, with the best fit marked; fixed ones are left out."""
+    arguments.kind("posterior", posterior, Posterior)
     from corner import corner as corner_plot  # loads scipy
 
     fit = posterior.fit

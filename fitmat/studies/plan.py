@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fitmat import arguments
 from fitmat.errors import ModelError
 from fitmat.fitting import known
 from fitmat.fitting.losses import DEFAULT
@@ -44,6 +45,8 @@ def model_names(asked: str | Sequence[str], measurements: Measurements) -> list[
     if isinstance(asked, str) and asked.strip() == EVERY:
         return list(every_model(measurements))
     parts = asked.split(",") if isinstance(asked, str) else asked
+    for part in parts:
+        arguments.kind("one of models", part, str)
     names = [normalised(part) for part in parts if part.strip()]
     if not names:
         raise ModelError("no model given; try --models lambert+blinn-phong,lambert+ggx.")
@@ -98,6 +101,27 @@ def plan(
     for job in jobs.values():
         refuse_idle(job["priors"], job["fixed"], find_loss(loss))
     return jobs
+
+
+def refuse_unsampled(count: int, most: int, loss: str, *, sampling: bool) -> None:
+    """Stop where there will be no draws of which a second sampler could say anything.
+
+    Args:
+        count: Values to fit.
+        most: Values above which nothing is sampled.
+        loss: What the fits minimise, by name.
+        sampling: Whether to sample.
+
+    Raises:
+        ModelError: says why nothing will be sampled.
+    """
+    asked, expected = "a second opinion (--check-posterior)", "expected a posterior that is sampled. Leave one out."
+    if not sampling:
+        raise ModelError(f"{asked} without sampling (--no-mcmc), {expected}")
+    if not find_loss(loss).posterior:
+        raise ModelError(f"{asked} under the loss {loss} (--loss), which is no likelihood, {expected}")
+    if count > most:
+        raise ModelError(f"{asked} on {count:,} values, expected at most {most:,}, which are sampled. Leave it out.")
 
 
 def _of(given: Mapping[str, Any] | None, names: set[str]) -> dict[str, Any]:

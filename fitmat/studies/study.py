@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import ArrayLike
 
+from fitmat import arguments
 from fitmat._types import SAMPLING, Progress
 from fitmat.errors import ModelError
 from fitmat.fitting.losses import DEFAULT
-from fitmat.fitting.losses import loss as find_loss
 from fitmat.fitting.streamed import fit_from, fit_part, rows
 from fitmat.judgement.choice import Choice, choose
 from fitmat.judgement.examination.examining import warnings
@@ -28,7 +28,7 @@ from fitmat.measurements.large.stream import Stream, hold
 from fitmat.measurements.samples import Measurements
 from fitmat.models.around.tilt import Tilted
 from fitmat.studies.findings import Findings, find
-from fitmat.studies.plan import DEFAULT_MODELS, Jobs, plan
+from fitmat.studies.plan import DEFAULT_MODELS, Jobs, plan, refuse_unsampled
 from fitmat.uncertainty import second_sampler
 from fitmat.uncertainty.chains import resumable_steps, sample
 from fitmat.uncertainty.laplace import laplace, laplace_each
@@ -125,9 +125,18 @@ def study(
     Example:
         >>> study(read("measurements.csv"), "lambert+phong,lambert+ggx").match.verdict  # doctest: +SKIP
     """
+    arguments.kind("measurements", measurements, Measurements, Stream)
+    arguments.kind("models", models, str, Sequence)
+    arguments.named(fixed=fixed, priors=priors)
+    for name, text in (("loss", loss), ("masking", masking), ("ior", ior)):
+        arguments.kind(name, text, str, optional=name != "loss")
+    arguments.whole("seed", seed)
+    arguments.flags(tilt=tilt, sampling=sampling, second_opinion=second_opinion, full=full)
+    arguments.kind("resume", resume, Path, optional=True)
+    arguments.function("progress", progress)
     say = progress or (lambda *_: None)
     if second_opinion:
-        _refuse_unsampled(measurements, loss, sampling)
+        refuse_unsampled(measurements.n_valid, MOST_SAMPLED, loss, sampling=sampling)
         second_sampler.require()
     stream = _as_stream(measurements)
     shown = stream if isinstance(stream, Measurements) else stream.part
@@ -140,18 +149,6 @@ def study(
     walking = sampling and first[0].fit.loss.posterior and first[0].fit.n_values <= MOST_SAMPLED
     posteriors = _sample_each(first, seed, resume, say) if walking else first
     return judge(posteriors, seed=seed, second_opinion=second_opinion, full=full, progress=say)
-
-
-def _refuse_unsampled(measurements: Measurements | Stream, loss: str, sampling: bool) -> None:
-    """Stop where there will be no draws of which a second sampler could say anything."""
-    asked, expected = "a second opinion (--check-posterior)", "expected a posterior that is sampled. Leave one out."
-    if not sampling:
-        raise ModelError(f"{asked} without sampling (--no-mcmc), {expected}")
-    if not find_loss(loss).posterior:
-        raise ModelError(f"{asked} under the loss {loss} (--loss), which is no likelihood, {expected}")
-    if measurements.n_valid > MOST_SAMPLED:
-        got = f"{asked} on {measurements.n_valid:,} values"
-        raise ModelError(f"{got}, expected at most {MOST_SAMPLED:,}, which are sampled. Leave it out.")
 
 
 def _as_stream(measurements: Measurements | Stream) -> Measurements | Stream:

@@ -14,6 +14,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from fitmat import arguments
 from fitmat._types import SAMPLING, Progress
 from fitmat.errors import FitmatError, OutputError
 from fitmat.fitting.result import Fit
@@ -70,6 +71,12 @@ def sample(
         FitmatError: the fit is not finite, or the folder holds checkpoints of another run.
         OutputError: the folder cannot be made.
     """
+    arguments.kind("fit", fit, Fit)
+    arguments.whole("seed", seed)
+    arguments.whole("walkers", walkers, 1, optional=True)
+    arguments.whole("max_steps", max_steps, 1)
+    arguments.function("progress", progress)
+    arguments.kind("checkpoint", checkpoint, Path, optional=True)
     sampler, state = _ensemble(fit, seed, walkers)
     kept, goal = None, SHORTEST
     if checkpoint is not None:

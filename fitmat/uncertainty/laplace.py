@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from fitmat import arguments
 from fitmat._types import Progress
 from fitmat.fitting import fitting
 from fitmat.fitting.coordinates import Coordinates
@@ -61,6 +62,9 @@ def laplace(fit: Fit, *, seed: int, corrected: bool = True) -> Posterior:
     Returns:
         A `Posterior`; a fit that is not finite, or under an objective, gives a single draw and no intervals.
     """
+    arguments.kind("fit", fit, Fit)
+    arguments.whole("seed", seed)
+    arguments.flags(corrected=corrected)
     if not (fit.finite and fit.loss.posterior):
         return Posterior(fit, "laplace", fit.values[None], np.array([fit.discrepancy]))
     rng, k, drawn = np.random.default_rng(seed), None, None

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from fitmat import arguments
 from fitmat.errors import FitmatError
 from fitmat.extras import needed
 from fitmat.fitting.coordinates import Coordinates
@@ -162,6 +163,9 @@ def check_posterior(
     Raises:
         FitmatError: the posterior holds no chain, or blackjax is missing.
     """
+    arguments.kind("posterior", posterior, Posterior)
+    for name, number, least in (("seed", seed, 0), ("chains", chains, 2), ("warmup", warmup, 1), ("count", count, 4)):
+        arguments.whole(name, number, least)
     require()
     if posterior.chain is None:
         raise FitmatError(

@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
+from fitmat import arguments
 from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
 from fitmat.judgement.design.candidates import Candidates, Limits, Measured, proposed
@@ -126,6 +127,13 @@ def next_angles(
     Example:
         >>> next_angles(laplace(fit, seed=0), target="eta", count=2)  # doctest: +SKIP
     """
+    arguments.kind("posterior", posterior, Posterior)
+    arguments.kind("target", target, str, optional=True)
+    arguments.kind("against", against, Posterior, optional=True)
+    arguments.choice("kind", kind, ("sample", "curve"))
+    arguments.whole("count", count, 1)
+    arguments.whole("repeats", repeats, 1)
+    arguments.kind("limits", limits, Limits, optional=True)
     fit, rival = posterior.fit, None if against is None else against.fit
     _refuse(fit, rival, target, (count, repeats))
     fits = (fit,) if rival is None or target != MATCH else (fit, rival)
@@ -159,6 +167,8 @@ def _refuse(fit: Fit, rival: Fit | None, target: str | None, numbers: tuple[int,
             raise FitmatError(f"{one.name}: the fit ended {one.result}, there is nothing to plan from; check the data.")
         if not len(one.free):
             raise FitmatError(f"{one.name}: every parameter is fixed, there is nothing to determine; free one.")
+    if target != MATCH and rival is not None:
+        raise FitmatError(f'against is given and target is {target!r}, expected "match" beside it. Leave it out.')
     if target == MATCH and rival is None:
         raise FitmatError("which model is right can be asked of two only: give a second model.")
     known = [*(e.name for e in fit.entries if e.name not in fit.held), *fit.coordinates.names]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from fitmat import arguments
 from fitmat.judgement.examination import finding_words, words
 from fitmat.judgement.examination.consistency import Agreement, Consistency, consistency
 from fitmat.judgement.examination.coverage import Coverage, coverage, mirror_frame
@@ -155,6 +156,7 @@ def examine(measurements: Measurements) -> Examination:
         >>> import fitmat as fm, numpy as np
         >>> print(examine(fm.from_arrays(np.full(3, 0.5), [-0.5, 0.0, 0.5], [0.1, 0.1, 0.3])))  # doctest: +SKIP
     """
+    arguments.kind("measurements", measurements, Measurements)
     looked = _looked(measurements)
     return dataclasses.replace(looked, prospects=prospects(measurements, looked.noise))
 

@@ -9,6 +9,7 @@ import math
 import numpy as np
 from jaxtyping import Float
 
+from fitmat import arguments
 from fitmat.fitting.information import UNDETERMINED
 from fitmat.fitting.priors import natural_sd
 from fitmat.fitting.result import Fit
@@ -162,6 +163,7 @@ def identify(posterior: Posterior) -> Identifiability:
     Returns:
         An `Identifiability`; without verdicts where nothing is free or the fit is not finite.
     """
+    arguments.kind("posterior", posterior, Posterior)
     fit = posterior.fit
     profiled = profiles(fit)
     if not profiled:

@@ -5,7 +5,7 @@ It reads no file and fits nothing.
 
 import dataclasses
 from collections.abc import Iterator
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Int
@@ -22,6 +22,7 @@ _GOLDEN = 0x9E3779B97F4A7C15
 # 2⁶⁴/φ: the multiples of it modulo 2⁶⁴ fill the range evenly, in step with no grid of angles.
 
 
+@runtime_checkable
 class Stream(Protocol):
     """Measurements that are passed over again and again.
 

@@ -37,6 +37,7 @@ from fitmat.models.multiple_scattering.surface import (
     mirror_phase,
     mirrored,
     reflectance,
+    refuse_kinds,
     smith,
     visible_normal,
 )
@@ -55,6 +56,7 @@ def evaluate_slab(
     Raises:
         ModelError: the surface transmits; also what `evaluate_walk` refuses.
     """
+    refuse_kinds(surface, samples, seed, order)
     if surface.transmits:
         raise ModelError("the surface transmits, and refracted light leaves the half space: take evaluate_walk.")
     plan = plan_paths(wi, wo, samples=samples, order=order)

@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Bool, Float, Int, PRNGKeyArray
 
 from fitmat.errors import ModelError
+from fitmat.models.base import direction_pairs
 from fitmat.models.multiple_scattering.surface import (
     Colours,
     Surface,
@@ -30,6 +31,7 @@ from fitmat.models.multiple_scattering.surface import (
     reflectance,
     refracted,
     refraction_phase,
+    refuse_kinds,
     smith,
     visible_normal,
 )
@@ -100,6 +102,7 @@ def evaluate_walk(
         >>> evaluate_walk(white, up, up, samples=10_000, seed=1).value.round(1)
         array([[0.4]])
     """
+    refuse_kinds(surface, samples, seed, order)
     plan = plan_paths(wi, wo, samples=samples, order=order)
     return plan.result(
         _evaluate(surface, plan.wi, plan.wo, plan.orders, jax.random.key(seed, impl=GENERATOR), plan.static), plan.wo[2]
@@ -112,6 +115,7 @@ def albedo_walk(surface: Surface, wi: ArrayLike, *, samples: int, seed: int) -> 
     A surface that absorbs nothing gives 1 in total without any noise: each path ends on one side or the other.
     Arguments and errors as for `evaluate_walk`.
     """
+    refuse_kinds(surface, samples, seed, None)
     plan = plan_paths(wi, wi, samples=samples, order=None)
     both = plan.result(
         _evaluate(surface, plan.wi, None, plan.orders, jax.random.key(seed, impl=GENERATOR), plan.static)
@@ -165,9 +169,7 @@ class Plan:
 
 def plan_paths(wi: ArrayLike, wo: ArrayLike, *, samples: int, order: int | None) -> Plan:
     """Check the inputs of an estimator and share its paths among lanes; see `evaluate_walk`."""
-    pair = [np.asarray(w, float) for w in (wi, wo)]
-    if pair[0].shape != pair[1].shape or pair[0].ndim != 2 or pair[0].shape[1] != 3 or len(pair[0]) == 0:
-        raise ModelError(f"wi and wo have shapes {pair[0].shape} and {pair[1].shape}: expected the same (n, 3), n ≥ 1.")
+    pair = direction_pairs(wi, wo)
     for label, w in zip(("wi", "wo"), pair, strict=True):
         wrong = ~((np.abs(np.linalg.norm(w, axis=1) - 1.0) < 1e-6) & (w[:, 2] > 0.0))
         if wrong.any():

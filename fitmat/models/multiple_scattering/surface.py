@@ -9,6 +9,7 @@ E. d'Eon & C. Dachsbacher, Multiple-scattering microfacet BSDFs with the Smith m
 Directions are given components first, (3, …), and point away from the collision; w may lie below the horizon.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
@@ -18,6 +19,7 @@ import numpy as np
 from jax.scipy.special import erf, erfinv
 from jaxtyping import Array, Bool, Float
 
+from fitmat import arguments
 from fitmat.errors import ModelError
 from fitmat.maths.directions import COS_MIN
 from fitmat.models.terms.distributions import GGX, AbstractDistribution, Beckmann, Slopes
@@ -35,7 +37,9 @@ Colours = Float[Array, "c n w"]
 
 def _as_slopes(slopes: Any) -> Slopes:
     """Arrays, so that surfaces that differ in their slopes alone share a compiled program."""
-    values = tuple(jnp.asarray(alpha, float) for alpha in slopes)
+    if not isinstance(slopes, Sequence | np.ndarray) or isinstance(slopes, str):
+        arguments.refuse("slopes", slopes, "(alpha_x, alpha_y), each from 0.0001 to 2")
+    values = tuple(a if isinstance(a, jax.Array) else jnp.asarray(arguments.numbers("slopes", a)) for a in slopes)
     if len(values) != 2 or not all(alpha.ndim == 0 and 1e-4 <= alpha <= 2.0 for alpha in values):
         raise ModelError(f"slopes {slopes}: expected (alpha_x, alpha_y), each from 0.0001 to 2.")
     return values
@@ -66,6 +70,8 @@ class Surface(eqx.Module):
             raise ModelError(
                 f"distribution {type(self.distribution).__name__}: multiple scattering needs GGX or Beckmann."
             )
+        arguments.flags(transmits=self.transmits)
+        arguments.kind("fresnel", self.fresnel, AbstractFresnel)
         if self.transmits and not (isinstance(self.fresnel, Dielectric) and np.size(self.fresnel.eta) == 1):
             raise ModelError("a surface that transmits needs fresnel = Dielectric with one eta for all channels.")
 
@@ -74,6 +80,18 @@ class Surface(eqx.Module):
         assert isinstance(self.fresnel, Dielectric)
         outside = jnp.reshape(self.fresnel.eta, ())
         return jnp.where(inside, 1.0 / outside, outside)
+
+
+def refuse_kinds(surface: object, samples: object, seed: object, order: object) -> None:
+    """Stop where a walk is given something else than it takes.
+
+    Raises:
+        FitmatError: names the argument.
+    """
+    arguments.kind("surface", surface, Surface)
+    arguments.whole("samples", samples)
+    arguments.whole("seed", seed)
+    arguments.whole("order", order, 1, optional=True)
 
 
 def smith(surface: Surface, w: Walkers3) -> Walker:
