@@ -3,12 +3,22 @@
 Knows no result.
 """
 
+import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
 import numpy as np
+
+MOST_SHOWN = 1500
+"""Characters of what a prompt shows of a result."""
+
+MOST_ROWS = 30
+"""Rows of a table in a notebook."""
+
+FEW = 4
+"""So many numbers or names are listed; of more, only how many there are is said."""
 
 LARGE = 1e6
 """Numbers from here on are written with a power of ten."""
@@ -39,6 +49,9 @@ def _digits(sd: float) -> int | None:
 
 def html_table(caption: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A table for a notebook; every text is escaped."""
+    left = len(rows) - MOST_ROWS
+    caption += f" The first {MOST_ROWS} of {len(rows)} rows; print it for all." if left > 0 else ""
+    rows = rows[:MOST_ROWS]
     head = "".join(f"<th>{escape(text)}</th>" for text in headings)
     body = "".join("<tr>" + "".join(f"<td>{escape(text)}</td>" for text in row) + "</tr>" for row in rows)
     return f"<p>{escape(caption)}</p><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
@@ -60,3 +73,51 @@ def plain(thing: Any) -> Any:
     if isinstance(thing, np.ndarray | np.generic):
         return plain(thing.tolist())
     return None if isinstance(thing, float) and not math.isfinite(thing) else thing
+
+
+def brief(thing: Any) -> str:
+    """What a prompt shows of a result: its own words where it has some, else its fields; arrays by their shape.
+
+    Example:
+        >>> @dataclasses.dataclass(frozen=True, eq=False)
+        ... class Curve:
+        ...     name: str
+        ...     values: np.ndarray
+        ...     __repr__ = brief
+        >>> Curve("kd", np.zeros((5, 3)))
+        Curve(name='kd', values=array (5, 3))
+    """
+    called = type(thing).__name__
+    if type(thing).__str__ is not object.__str__:
+        whole = f"{called}: {thing}"
+    else:
+        parts = (f"{f.name}={_shown(getattr(thing, f.name))}" for f in dataclasses.fields(thing))
+        whole = f"{called}({', '.join(parts)})"
+    return whole if len(whole) <= MOST_SHOWN else f"{whole[:MOST_SHOWN].rstrip()} … (print it for all)"
+
+
+def _shown(part: Any) -> str:
+    """One field, in a few words."""
+    if isinstance(part, float | np.floating):
+        return f"{part:.4g}"
+    if part is None or isinstance(part, bool | int | np.generic):
+        return str(part)
+    if isinstance(part, str):
+        return repr(part if len(part) <= 60 else part[:59] + "…")
+    if hasattr(part, "shape"):
+        few = np.ndim(part) == 1 and np.size(part) <= FEW
+        return f"[{', '.join(map(_shown, np.asarray(part)))}]" if few else f"array {tuple(np.shape(part))}"
+    if isinstance(part, Mapping):
+        return f"{{{_listed([str(key) for key in part])}}}"
+    if isinstance(part, tuple | list):
+        return f"({_listed([_shown(one) for one in part])})"
+    if dataclasses.is_dataclass(part) and all(
+        isinstance(getattr(part, f.name), float | int | str | tuple | None) for f in dataclasses.fields(part)
+    ):
+        return f"{type(part).__name__}({', '.join(_shown(getattr(part, f.name)) for f in dataclasses.fields(part))})"
+    name = getattr(part, "name", None)
+    return f"{type(part).__name__}({name})" if isinstance(name, str) else type(part).__name__
+
+
+def _listed(texts: Sequence[str]) -> str:
+    return ", ".join(texts if len(texts) <= FEW else [*texts[: FEW - 1], f"… {len(texts)} in all"])

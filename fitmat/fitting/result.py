@@ -21,7 +21,7 @@ from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import Entry, entries, vector, with_vector
 from fitmat.models.values import at
-from fitmat.text import html_table, text_table, with_error
+from fitmat.text import brief, html_table, text_table, with_error
 
 AGREE = 0.1
 """Starts whose log-likelihood is within this of the best have found the same optimum."""
@@ -82,6 +82,8 @@ class Fit:
     n_values: int
     misfit: float
     discrepancy_sd: float | None = None
+
+    __repr__ = brief
 
     @property
     def entries(self) -> tuple[Entry, ...]:

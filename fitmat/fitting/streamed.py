@@ -24,6 +24,7 @@ from fitmat.measurements.large.noise import Scatter, scatter
 from fitmat.measurements.large.stream import Held, Stream
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector, with_vector
+from fitmat.text import brief
 
 T = TypeVar("T")
 
@@ -59,6 +60,8 @@ class Rows:
     chunks: Stream
     known: Scatter
     prepared: tuple[Data, ...] | None
+
+    __repr__ = brief
 
 
 def rows(chunks: Stream, progress: Progress | None = None) -> Rows:

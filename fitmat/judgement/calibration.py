@@ -30,6 +30,7 @@ from fitmat.models.base import AbstractBRDF, evaluate
 from fitmat.models.parameters import entries, vector, with_vector
 from fitmat.models.registry import model
 from fitmat.models.values import values
+from fitmat.text import brief
 from fitmat.uncertainty.chains import sample
 from fitmat.uncertainty.laplace import laplace
 from fitmat.uncertainty.posterior import Posterior
@@ -70,6 +71,8 @@ class Calibration:
     ranks: Int[np.ndarray, "n q"]
     covered: Bool[np.ndarray, "n levels q-1"]
     trusted: Bool[np.ndarray, " n"]
+
+    __repr__ = brief
 
     def coverage(self) -> Float[np.ndarray, "levels q-1"]:
         """Fraction of trusted posteriors whose interval holds the truth."""

@@ -19,7 +19,7 @@ from fitmat.judgement.left_out import LeftOut, leave_incidences_out
 from fitmat.judgement.plausibility import broken_laws, doubts
 from fitmat.measurements.samples import Measurements
 from fitmat.models.registry import LOBES
-from fitmat.text import html_table, text_table
+from fitmat.text import brief, html_table, text_table
 from fitmat.uncertainty.posterior import Posterior
 
 SMALL, SURE = 4.0, 2.0
@@ -58,6 +58,8 @@ class Candidate:
     broken: tuple[str, ...]
     doubts: tuple[str, ...]
 
+    __repr__ = brief
+
     @property
     def name(self) -> str:
         """The model's."""
@@ -88,6 +90,8 @@ class Choice:
     """
 
     candidates: tuple[Candidate, ...]
+
+    __repr__ = brief
 
     @property
     def best(self) -> Candidate:

@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from fitmat.fitting.likelihood import log_pointwise
 from fitmat.judgement.prediction import predictions
+from fitmat.text import brief
 from fitmat.uncertainty.pareto import leave_one_out
 from fitmat.uncertainty.posterior import GOOD_PARETO, Posterior
 
@@ -37,6 +38,8 @@ class Evidence:
     p_loo: float
     bad: float
     pointwise: Float[np.ndarray, " n"]
+
+    __repr__ = brief
 
 
 def weigh(posterior: Posterior) -> Evidence | None:

@@ -14,6 +14,7 @@ from fitmat.fitting.result import Fit
 from fitmat.judgement.prediction import predictions
 from fitmat.measurements.incidences import incidences
 from fitmat.models.metrics import cube_root
+from fitmat.text import brief
 
 MOST_REFITTED = 50_000
 """Values above which nothing is refitted."""
@@ -39,6 +40,8 @@ class LeftOut:
     z: np.ndarray
     values: np.ndarray
     settled: np.ndarray
+
+    __repr__ = brief
 
     @property
     def error(self) -> float:

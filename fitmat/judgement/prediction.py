@@ -19,6 +19,7 @@ from fitmat.measurements.samples import Measurements
 from fitmat.models.around.noise import Noisy
 from fitmat.models.parameters import with_vector
 from fitmat.models.values import at, slices, values
+from fitmat.text import brief
 from fitmat.uncertainty.posterior import Posterior
 
 BAND_DRAWS = 200
@@ -42,6 +43,8 @@ class Section:
     phi_i: float
     rows: np.ndarray
     theta_o: np.ndarray
+
+    __repr__ = brief
 
 
 def sections(m: Measurements, most: int = 8) -> list[Section]:

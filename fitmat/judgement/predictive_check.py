@@ -17,7 +17,7 @@ from fitmat.judgement.prediction import predictions
 from fitmat.judgement.predictive_statistics import Replicates, Statistic
 from fitmat.maths import normal
 from fitmat.measurements.incidences import incidences
-from fitmat.text import html_table, text_table
+from fitmat.text import brief, html_table, text_table
 from fitmat.uncertainty.posterior import Posterior
 
 REPLICATED_DRAWS = 200
@@ -54,6 +54,8 @@ class PredictiveCheck:
 
     posterior: Posterior
     statistics: tuple[Statistic, ...]
+
+    __repr__ = brief
 
     @property
     def failed(self) -> tuple[Statistic, ...]:

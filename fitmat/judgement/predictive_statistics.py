@@ -14,6 +14,7 @@ from fitmat.judgement.prediction import replicated
 from fitmat.maths import binomial, normal
 from fitmat.measurements.incidences import Incidence
 from fitmat.measurements.neighbours import curves
+from fitmat.text import brief
 
 REPLICATES = 4000
 """Patterns that are drawn to judge one."""
@@ -88,6 +89,8 @@ class Replicates:
     below: Float[np.ndarray, "d n c"]
     x: Float[np.ndarray, "d n c"]
     noise: Float[np.ndarray, "d n c"]
+
+    __repr__ = brief
 
     def whole(self) -> Iterator[Statistic]:
         """The largest residual, and how many are beyond 2 sd."""

@@ -24,6 +24,7 @@ from fitmat.models.lobes.walter import Walter
 from fitmat.models.terms.distributions import AbstractDistribution, Beckmann, Slopes
 from fitmat.models.terms.fresnel import AbstractFresnel
 from fitmat.models.values import Draws, blocks, surfaces, widths
+from fitmat.text import brief
 from fitmat.uncertainty.estimate import Estimate, band, estimate
 
 TERMS = {
@@ -119,6 +120,8 @@ class Ablation:
     fall: dict[str, Float[np.ndarray, "3 k"]]
     near: dict[str, Estimate]
     grazing: dict[str, Estimate]
+
+    __repr__ = brief
 
     def causes(self, where: dict[str, Estimate]) -> tuple[str, ...]:
         """The terms without which the distance certainly falls by `EXPLAINS` or more, the strongest first.

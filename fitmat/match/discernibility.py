@@ -13,6 +13,7 @@ from fitmat.fitting.result import Fit
 from fitmat.match.distances import PairedDraws
 from fitmat.measurements.incidences import incidences
 from fitmat.models.values import values
+from fitmat.text import brief
 from fitmat.uncertainty.estimate import Estimate, band, estimate
 
 SEPARATED = 3.92
@@ -53,6 +54,8 @@ class Telling:
     repeats: Float[np.ndarray, "3 k"]
     every: Estimate
     known: bool
+
+    __repr__ = brief
 
     @property
     def alike_up_to_deg(self) -> float | None:

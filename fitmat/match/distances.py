@@ -15,6 +15,7 @@ from fitmat.maths.quadrature import AZIMUTH_NODES, ZENITH_NODES, Rule, lobe_rule
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.metrics import METRICS, NGAN_DEG, Metric
 from fitmat.models.values import Draws, blocks, surfaces, widths
+from fitmat.text import brief
 from fitmat.uncertainty.estimate import Estimate, band, estimate
 
 AZIMUTHS = 4
@@ -57,6 +58,8 @@ class Distances:
     by_incidence_and_region: dict[str, Float[np.ndarray, "3 k 4"]]
     grazing_excess: Estimate
     albedos: Float[np.ndarray, "2 d k"]
+
+    __repr__ = brief
 
 
 PairedDraws = tuple[Float[np.ndarray, "d p"], Float[np.ndarray, "d q"]]

@@ -32,6 +32,7 @@ from fitmat.models.metrics import METRICS
 from fitmat.models.parameters import check_range, entries, vector, with_vector
 from fitmat.models.registry import model
 from fitmat.models.values import at, values, widths
+from fitmat.text import brief
 
 LEAST_SQUARES = tuple(name for name, metric in METRICS.items() if metric.kind != "light")
 """Metrics that are sums of squares, and can be minimised as such."""
@@ -66,6 +67,8 @@ class Imitation:
     metric: str
     distance: float
     converged: bool
+
+    __repr__ = brief
 
     @property
     def parameters(self) -> dict[str, np.ndarray]:

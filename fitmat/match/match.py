@@ -25,6 +25,7 @@ from fitmat.match.sentences import STRONG_EVIDENCE as STRONG_EVIDENCE
 from fitmat.measurements.incidences import incidences
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
 from fitmat.models.registry import LOBES, lobe_names
+from fitmat.text import brief
 from fitmat.uncertainty.estimate import Estimate, band, estimate
 from fitmat.uncertainty.posterior import Posterior
 
@@ -101,6 +102,12 @@ class Match:
     telling: Telling
     perceived: Perceived | None
     imitations: tuple[Imitation, ...]
+
+    __repr__ = brief
+
+    def __str__(self) -> str:
+        """The verdict."""
+        return self.verdict
 
     @property
     def verdict(self) -> str:

@@ -13,6 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from fitmat.text import brief
+
 EDGE = 2.0**-24
 """Positions are sampled this far inside the unit square, as the published code does: an inverse is unique there."""
 
@@ -98,6 +100,8 @@ class Warp:
     density: Float[np.ndarray, "s h w"]
     conditional: Float[np.ndarray, "s h w"]
     marginal: Float[np.ndarray, "s h"]
+
+    __repr__ = brief
 
     @classmethod
     def of(cls, density: Float[np.ndarray, "s h w"]) -> "Warp":

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from fitmat.maths.directions import zenith
+from fitmat.text import brief
 
 MOST = 12
 """More angles than this are taken together, neighbours first, to so many groups."""
@@ -30,6 +31,8 @@ class Incidence:
     name: str
     theta_i_deg: float
     rows: np.ndarray
+
+    __repr__ = brief
 
 
 def incidences(

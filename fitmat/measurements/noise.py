@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from fitmat.measurements.neighbours import leave_one_out
 from fitmat.measurements.samples import Measurements
+from fitmat.text import brief
 
 MIN_RESIDUALS = 12
 """Fewer neighbour comparisons than this say nothing about the noise."""
@@ -59,6 +60,8 @@ class Noise:
     known: bool
     words: str
     laws: Float[np.ndarray, "c 2"] | None = None
+
+    __repr__ = brief
 
 
 def measured_noise(m: Measurements) -> Noise:

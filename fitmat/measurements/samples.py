@@ -15,6 +15,7 @@ from fitmat import arguments
 from fitmat.errors import ReadError
 from fitmat.maths.directions import from_angles, relative_azimuth, signed_azimuth, signed_zenith, zenith
 from fitmat.measurements.instrument import IDEAL, Instrument
+from fitmat.text import brief
 
 IN_PLANE = np.deg2rad(0.5)
 """A sample whose azimuth is within this angle of the plane of incidence counts as in-plane."""
@@ -53,6 +54,8 @@ class Measurements:
     masked: dict[str, int] = dataclasses.field(default_factory=dict)
     notes: tuple[str, ...] = ()
     instrument: Instrument = IDEAL
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         arguments.kind("channels", self.channels, tuple, list)
@@ -140,8 +143,10 @@ class Measurements:
         """A few plain lines: how much, which channels, which angles, what was masked, what was assumed."""
         angles = np.unique(np.round(np.rad2deg(self.theta_i), 1))
         listed = ", ".join(f"{a:g}°" for a in angles[:8]) + (" …" if len(angles) > 8 else "")
+        names = self.channels if len(self.channels) <= 12 else (*self.channels[:3], "…", self.channels[-1])
+        count = "" if len(names) == len(self.channels) else f" ({len(self.channels)})"
         lines = [
-            f"{self.source}: {self.n_samples} samples, channels {', '.join(self.channels)}",
+            f"{self.source}: {self.n_samples} samples, channels {', '.join(names)}{count}",
             f"incidence {listed}; sigma {'given' if self.sigma is not None else 'not given'}",
         ]
         lines += [f"{count} masked: {reason}" for reason, count in self.masked.items()]

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from fitmat.errors import ModelError
 from fitmat.maths.directions import from_angles, zenith
 from fitmat.maths.warp import Blend, Cell, Warp
+from fitmat.text import brief
 
 UNIT = 1e-6
 """How far the length of a direction may be from 1."""
@@ -78,6 +79,8 @@ class RGLMaterial:
     channels: tuple[str, ...]
     jacobian: bool
     description: str
+
+    __repr__ = brief
 
     @property
     def isotropic(self) -> bool:

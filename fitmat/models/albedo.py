@@ -14,6 +14,7 @@ from fitmat.maths.quadrature import AZIMUTH_NODES, ZENITH_NODES, incidence_rule,
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector
 from fitmat.models.values import Draws, blocks, widths
+from fitmat.text import brief
 
 FINE = (ZENITH_NODES, AZIMUTH_NODES)
 
@@ -39,6 +40,8 @@ class Albedo:
 
     value: Float[np.ndarray, "k c"]
     error: Float[np.ndarray, "k c"]
+
+    __repr__ = brief
 
 
 def albedo(model: AbstractBRDF, theta_i: ArrayLike | None = None, phi_i: ArrayLike = 0.0) -> Albedo:

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.judgement.prediction import Section, curve, predictive_band
+from fitmat.text import brief
 from fitmat.uncertainty.posterior import Posterior
 
 EVERY_DEG, NEAR_DEG = np.linspace(-89.0, 89.0, 357), np.linspace(-3.0, 3.0, 121)
@@ -33,6 +34,8 @@ class Curve:
     theta_o: Float[np.ndarray, " k"]
     value: Float[np.ndarray, "k c"]
     band: Float[np.ndarray, "2 r c"]
+
+    __repr__ = brief
 
 
 def predict_curves(posterior: Posterior, along: Sequence[Section]) -> tuple[Curve, ...]:

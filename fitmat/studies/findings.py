@@ -17,6 +17,7 @@ from fitmat.judgement.identifiability.verdicts import Identifiability
 from fitmat.judgement.prediction import Section, standardised_residuals
 from fitmat.judgement.predictive_check import PredictiveCheck
 from fitmat.studies.curves import Curve, predict_curves
+from fitmat.text import brief
 from fitmat.uncertainty.posterior import Posterior
 from fitmat.uncertainty.quantities import Quantity, derived, parameters
 from fitmat.uncertainty.second_sampler import SecondOpinion
@@ -70,6 +71,8 @@ class Findings:
     identifiability: Identifiability | None = None
     check: PredictiveCheck | None = None
     second_opinion: SecondOpinion | None = None
+
+    __repr__ = brief
 
     @property
     def fit(self) -> Fit:

@@ -29,6 +29,7 @@ from fitmat.measurements.samples import Measurements
 from fitmat.models.around.tilt import Tilted
 from fitmat.studies.findings import Findings, find
 from fitmat.studies.plan import DEFAULT_MODELS, Jobs, plan, refuse_unsampled
+from fitmat.text import brief
 from fitmat.uncertainty import second_sampler
 from fitmat.uncertainty.chains import resumable_steps, sample
 from fitmat.uncertainty.laplace import laplace, laplace_each
@@ -62,6 +63,8 @@ class Study:
     full: bool = False
     warnings: tuple[str, ...] = ()
 
+    __repr__ = brief
+
     @property
     def measurements(self) -> Measurements:
         """What was fitted."""
@@ -71,6 +74,11 @@ class Study:
     def posteriors(self) -> tuple[Posterior, ...]:
         """One for each model."""
         return tuple(found.posterior for found in self.findings)
+
+    def __str__(self) -> str:
+        """What was fitted, how each fit ended, and the verdict of the match."""
+        m, ends = self.measurements, [str(found.fit).partition("\n")[0] for found in self.findings]
+        return "\n".join([f"{m.source}: {m.n_samples} samples", *ends, *([self.match.verdict] if self.match else [])])
 
     @property
     def detailed(self) -> tuple[Findings, ...]:

@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.errors import FitmatError, OutputError
+from fitmat.text import brief
 
 SHARE = 0.02
 """Writing takes at most this fraction of the time: where a disk is slow, parts become longer."""
@@ -44,6 +45,8 @@ class Saved:
     accepted: Float[np.ndarray, " walkers"]
     random_state: tuple[Any, ...]
     goal: int
+
+    __repr__ = brief
 
 
 class Checkpoint:

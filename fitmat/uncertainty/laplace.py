@@ -19,6 +19,7 @@ from fitmat.fitting.coordinates import Coordinates
 from fitmat.fitting.information import inverse_information
 from fitmat.fitting.result import Fit
 from fitmat.measurements.samples import Measurements
+from fitmat.text import brief
 from fitmat.uncertainty.density import log_posterior, physical
 from fitmat.uncertainty.pareto import smoothed
 from fitmat.uncertainty.posterior import GOOD_PARETO, Posterior
@@ -151,6 +152,8 @@ class HeavyTailed:
     factor: np.ndarray
     whitening: np.ndarray
     moved: Coordinates
+
+    __repr__ = brief
 
     def drawn(self, count: int, random: np.random.Generator | np.random.RandomState) -> Float[np.ndarray, "count d"]:
         """Draws of the sampled coordinates; the bounds of the parameters do not hold them."""

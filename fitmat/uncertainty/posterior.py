@@ -19,7 +19,7 @@ from fitmat.fitting.coordinates import channel_names
 from fitmat.fitting.result import Fit
 from fitmat.maths import normal
 from fitmat.models.parameters import Entry
-from fitmat.text import html_table, text_table, with_error
+from fitmat.text import brief, html_table, text_table, with_error
 from fitmat.uncertainty.estimate import limits
 
 VERDICTS = {
@@ -72,6 +72,8 @@ class Diagnostics:
     walkers: int
     seed: int
 
+    __repr__ = brief
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Posterior:
@@ -96,6 +98,8 @@ class Posterior:
     diagnostics: Diagnostics | None = None
     interrupted: bool = False
     pareto_k: float | None = None
+
+    __repr__ = brief
 
     @property
     def verdict(self) -> str:

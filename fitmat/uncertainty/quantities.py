@@ -11,6 +11,7 @@ import numpy as np
 from fitmat.fitting.coordinates import coordinates
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
 from fitmat.models.terms.fresnel import eta_from_f0, f0_from_eta
+from fitmat.text import brief
 from fitmat.uncertainty.estimate import limits
 from fitmat.uncertainty.posterior import Posterior
 
@@ -45,6 +46,8 @@ class Quantity:
     ci95: np.ndarray
     per_channel: bool
     remark: str
+
+    __repr__ = brief
 
 
 def parameters(posterior: Posterior, undetermined: Collection[str] = ()) -> list[Quantity]:

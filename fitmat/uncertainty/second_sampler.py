@@ -22,7 +22,7 @@ from fitmat.fitting.likelihood import Data
 from fitmat.fitting.result import Fit
 from fitmat.maths.mapping import mapped
 from fitmat.models.base import AbstractBRDF
-from fitmat.text import html_table, text_table
+from fitmat.text import brief, html_table, text_table
 from fitmat.uncertainty.density import log_density_at, physical
 from fitmat.uncertainty.laplace import draws
 from fitmat.uncertainty.posterior import ENOUGH_ESS, GOOD_RHAT, Posterior, split_rhat
@@ -58,6 +58,8 @@ class Agreement:
     second: Float[np.ndarray, "3"]
     error: Float[np.ndarray, "3"]
     sd: float
+
+    __repr__ = brief
 
     @property
     def distance(self) -> Float[np.ndarray, "3"]:
@@ -97,6 +99,8 @@ class SecondOpinion:
     rhat: float
     ess: float
     diverging: float
+
+    __repr__ = brief
 
     @property
     def verdict(self) -> str:

@@ -173,3 +173,36 @@ def test_what_was_not_sampled_has_no_second_opinion(studied: Study, monkeypatch:
     monkeypatch.setattr(room, "check_predictions", lambda posterior, seed: posterior)
     found = judge(studied.posteriors[:1], seed=0, second_opinion=True)
     assert [f.second_opinion for f in found.findings] == [None]
+
+
+def parts(thing: Any) -> dict[int, Any]:
+    """All that a result is made of, by identity."""
+    inner = list(thing) if isinstance(thing, tuple | list) else list(thing.values()) if isinstance(thing, dict) else []
+    found = {}
+    if dataclasses.is_dataclass(thing):
+        found[id(thing)] = thing
+        inner = [getattr(thing, field.name) for field in dataclasses.fields(thing)]
+    for one in inner:
+        found |= parts(one)
+    return found
+
+
+def test_a_prompt_shows_what_a_result_is(studied: Study) -> None:
+    """Not the draws behind it: at most 2,000 characters, which begin with what it is."""
+    every = parts((studied, fm.examine(studied.measurements))).values()
+    assert {type(one).__name__ for one in every} >= {
+        "Study",
+        "Findings",
+        "Match",
+        "Choice",
+        "Posterior",
+        "Fit",
+        "Examination",
+    }
+    for one in every:
+        assert repr(one).startswith(type(one).__name__)
+        assert len(repr(one)) <= 2000
+    assert repr(studied).startswith("Study: simulated lambert+ggx: 51 samples\nlambert+blinn-phong: ")
+    assert studied.match is not None
+    assert repr(studied.match) == f"Match: {studied.match.verdict}"
+    assert "ks" in repr(studied.findings[0].fit)

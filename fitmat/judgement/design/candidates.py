@@ -13,6 +13,7 @@ from fitmat.fitting.result import Fit
 from fitmat.judgement.prediction import sections
 from fitmat.maths.directions import from_angles
 from fitmat.models.values import widths
+from fitmat.text import brief
 
 Measured = Literal["sample", "curve"]
 """A single sample, or one incidence with a scan of theta_o."""
@@ -63,6 +64,8 @@ class Candidates:
     theta_o: Float[np.ndarray, "k m"]
     phi: Float[np.ndarray, " k"]
     used: Bool[np.ndarray, "k m"]
+
+    __repr__ = brief
 
     def directions(self) -> tuple[Float[np.ndarray, "k m 3"], Float[np.ndarray, "k m 3"]]:
         """Unit vectors to the light and to the sensor."""

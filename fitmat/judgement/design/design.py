@@ -20,6 +20,7 @@ from fitmat.fitting.result import Fit
 from fitmat.judgement.design.candidates import Candidates, Limits, Measured, proposed
 from fitmat.judgement.design.filters import Bank, Task, bank, scores
 from fitmat.measurements.noise import channel_laws
+from fitmat.text import brief
 from fitmat.uncertainty.posterior import Posterior
 
 APART = 4.9
@@ -59,6 +60,8 @@ class Proposal:
     sd: Float[np.ndarray, " f"]
     sd_if: Float[np.ndarray, "t f"]
 
+    __repr__ = brief
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Design:
@@ -87,6 +90,8 @@ class Design:
     proposals: tuple[Proposal, ...]
     candidates: Candidates
     gains: Float[np.ndarray, " k"]
+
+    __repr__ = brief
 
 
 def next_angles(

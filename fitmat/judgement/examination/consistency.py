@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from fitmat.judgement.examination.coverage import settled
 from fitmat.measurements.samples import IN_PLANE, SCANNED, Measurements
+from fitmat.text import brief
 
 TOLERANCE = (np.deg2rad(0.01), np.deg2rad(0.5))
 """Two geometries count as the same within a quarter of the angular step, but not less or more than this."""
@@ -55,6 +56,8 @@ class Agreement:
     noise: float | None = None
     differ: bool = False
 
+    __repr__ = brief
+
     @property
     def judged(self) -> bool:
         """Whether there are enough pairs to say anything."""
@@ -74,6 +77,8 @@ class Consistency:
     reciprocity: Agreement
     sides: Agreement
     azimuths: Agreement
+
+    __repr__ = brief
 
 
 def consistency(

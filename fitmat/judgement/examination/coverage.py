@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float
 
 from fitmat.maths.directions import zenith
 from fitmat.measurements.samples import IN_PLANE, Measurements
+from fitmat.text import brief
 
 SAME = np.deg2rad(0.15)
 """Incidence angles closer than this are one setting of the instrument."""
@@ -69,6 +70,8 @@ class Incidence:
     nearest: float
     covered: float
 
+    __repr__ = brief
+
     @property
     def flat(self) -> bool:
         """Whether all samples lie in the plane of incidence."""
@@ -104,6 +107,8 @@ class Coverage:
     phi_i: np.ndarray
     in_plane: bool
     grazing: float
+
+    __repr__ = brief
 
 
 def coverage(m: Measurements) -> Coverage:

@@ -21,7 +21,7 @@ from fitmat.judgement.examination.prospects import ASSUMED, Prospect, prospects
 from fitmat.judgement.examination.value_range import ValueRange, value_range
 from fitmat.measurements.noise import Noise, channel_laws, measured_noise
 from fitmat.measurements.samples import Measurements
-from fitmat.text import plain
+from fitmat.text import brief, plain
 
 MOST_ESTIMATED = 100_000
 """Rows times channels above which a noise that the file does not give is not estimated from neighbours."""
@@ -64,6 +64,8 @@ class Examination:
     levels: tuple[Level, ...]
     tilt: Tilt | None
     prospects: tuple[Prospect, ...]
+
+    __repr__ = brief
 
     @property
     def warnings(self) -> list[str]:

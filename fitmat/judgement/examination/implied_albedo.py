@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float, Int
 
 from fitmat.judgement.examination.coverage import Incidence
 from fitmat.measurements.samples import IN_PLANE, Measurements
+from fitmat.text import brief
 
 AZIMUTHS = 3
 """Of samples at fewer relative azimuths, left and right taken as alike, the curve in the plane tells more."""
@@ -67,6 +68,8 @@ class ImpliedAlbedo:
     error: Float[np.ndarray, " c"]
     covered: float
     assumed: bool
+
+    __repr__ = brief
 
     @property
     def too_large(self) -> np.ndarray:

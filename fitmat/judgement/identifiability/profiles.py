@@ -14,6 +14,7 @@ from fitmat.fitting.information import inverse_information, normal_equations_at
 from fitmat.fitting.likelihood import Data
 from fitmat.fitting.result import Fit
 from fitmat.models.values import at
+from fitmat.text import brief
 
 STEPS = 16
 """Points on either side of the best value."""
@@ -73,6 +74,8 @@ class Profile:
     points: Points
     interval: tuple[float, float]
     open: tuple[bool, bool]
+
+    __repr__ = brief
 
     @property
     def sd(self) -> float:

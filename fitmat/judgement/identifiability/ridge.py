@@ -13,6 +13,7 @@ from jaxtyping import Float
 from fitmat.fitting.priors import natural_sd
 from fitmat.fitting.result import Fit
 from fitmat.judgement.identifiability.profiles import STEPS, Profile, along
+from fitmat.text import brief
 
 NODES = 4 * STEPS
 """Gaussians on the ridge, fewer only for a single parameter."""
@@ -43,6 +44,8 @@ class Ridge:
     centre: Float[np.ndarray, "e f"]
     across: Float[np.ndarray, "e f f"]
     along: Float[np.ndarray, "e f"]
+
+    __repr__ = brief
 
     @property
     def covariance(self) -> Float[np.ndarray, "e f f"]:

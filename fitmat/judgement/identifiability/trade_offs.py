@@ -13,6 +13,7 @@ from jaxtyping import Float
 from fitmat.fitting.priors import natural_sd
 from fitmat.fitting.result import Fit
 from fitmat.models.terms.fresnel import f0_from_eta, f0_from_ior
+from fitmat.text import brief
 
 CONDITION = 30.0
 """Condition index from which columns of a Jacobian act alike: "moderate to strong" of Belsley, Kuh & Welsch (1980,
@@ -54,6 +55,8 @@ class Combination:
     sd: Float[np.ndarray, " k"]
     ci95: Float[np.ndarray, "k 2"]
 
+    __repr__ = brief
+
     @property
     def relative(self) -> float:
         """The largest relative standard deviation over the channels."""
@@ -73,6 +76,8 @@ class Group:
     names: tuple[str, ...]
     index: float
     combination: Combination | None
+
+    __repr__ = brief
 
 
 def _f0(v: Values) -> np.ndarray:

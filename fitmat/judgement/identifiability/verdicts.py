@@ -16,7 +16,7 @@ from fitmat.fitting.result import Fit
 from fitmat.judgement.identifiability.profiles import Profile, profiles
 from fitmat.judgement.identifiability.ridge import Ridge, ridge
 from fitmat.judgement.identifiability.trade_offs import Group, groups
-from fitmat.text import html_table, interval, text_table, with_error
+from fitmat.text import brief, html_table, interval, text_table, with_error
 from fitmat.uncertainty.posterior import Posterior
 
 CONTRACTION_DRAWS = 4000
@@ -63,6 +63,8 @@ class Verdict:
     open: tuple[bool, bool]
     contraction: float
 
+    __repr__ = brief
+
     @property
     def narrower(self) -> float:
         """Prior over posterior standard deviation."""
@@ -85,6 +87,8 @@ class Identifiability:
     verdicts: tuple[Verdict, ...]
     spectrum: Float[np.ndarray, " f"]
     groups: tuple[Group, ...]
+
+    __repr__ = brief
 
     def state(self, name: str) -> str:
         """The state of a parameter; of several channels the worst.

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.match.appearance import differences
+from fitmat.text import brief
 
 COVERED = 0.95
 """Share of each colour-matching function that must lie between the first and the last wavelength."""
@@ -39,6 +40,8 @@ class Colouring:
 
     weights: Float[np.ndarray, "c 3"]
     words: str
+
+    __repr__ = brief
 
 
 def colouring(channels: tuple[str, ...]) -> Colouring:

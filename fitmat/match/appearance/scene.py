@@ -15,6 +15,7 @@ from jaxtyping import Float
 
 from fitmat.maths.directions import zenith
 from fitmat.maths.quadrature import Rule, facets, gauss, lobe_rule
+from fitmat.text import brief
 
 LIGHTS = {"front light": (20.0, 120.0), "side light": (60.0, 150.0), "rim light": (140.0, 45.0)}
 """Name → angle from the viewer and direction on the screen (counter-clockwise from the right), degrees."""
@@ -59,6 +60,8 @@ class Screen:
     along: Float[np.ndarray, " b"]
     area: Float[np.ndarray, "a s b"]
 
+    __repr__ = brief
+
     @property
     def normals(self) -> Float[np.ndarray, "a s b 3"]:
         """Of the pixels, in the viewer's axes."""
@@ -96,6 +99,8 @@ class Lit:
     wi: Float[np.ndarray, "m 3"]
     wo: Float[np.ndarray, "m 3"]
 
+    __repr__ = brief
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Surrounded:
@@ -112,6 +117,8 @@ class Surrounded:
     wi: Float[np.ndarray, "s k 3"]
     wo: Float[np.ndarray, "s k 3"]
     light: Float[np.ndarray, "s j k"]
+
+    __repr__ = brief
 
 
 def radiance(w: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "..."]:

@@ -19,6 +19,7 @@ from fitmat.match.distances import PairedDraws
 from fitmat.maths.directions import zenith
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.values import Draws, blocks, surfaces, values, widths
+from fitmat.text import brief
 from fitmat.uncertainty.estimate import Estimate, estimate
 
 SPHERE_DRAWS = 20
@@ -72,6 +73,8 @@ class Lighting:
     delta_e_itp: Spread
     pictures: "Pictures | None"
 
+    __repr__ = brief
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Pictures:
@@ -86,6 +89,8 @@ class Pictures:
     empirical: Float[np.ndarray, "h w 3"]
     microfacet: Float[np.ndarray, "h w 3"]
     difference: Float[np.ndarray, "h w"]
+
+    __repr__ = brief
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -105,6 +110,8 @@ class Perceived:
     delta_e_2000: Spread
     delta_e_itp: Spread
     colours: str
+
+    __repr__ = brief
 
     @property
     def words(self) -> str:

@@ -24,6 +24,7 @@ from fitmat.maths.directions import from_angles
 from fitmat.measurements.parsing import blocks, contents
 from fitmat.measurements.parsing.recording import Recording
 from fitmat.measurements.samples import default_channels
+from fitmat.text import brief
 
 COLOURS = {"monochrome": default_channels(1), "rgb": ("r", "g", "b"), "xyz": ("x", "y", "z"), "spectrum": ()}
 """COLOR_MODEL → channels; a spectrum has those of WAVELENGTH_LIST."""
@@ -82,6 +83,8 @@ class _Block:
     entries: Mapping[str, str]
     mode: str
     notes: tuple[str, ...]
+
+    __repr__ = brief
 
     @property
     def end(self) -> int:

@@ -26,6 +26,7 @@ from fitmat.measurements.parsing.table import Table
 from fitmat.measurements.reader import FORMATS, measured
 from fitmat.measurements.samples import Measurements
 from fitmat.measurements.scale import of_unknown_scale
+from fitmat.text import brief
 
 LARGE = 1 << 28
 """Bytes of a table from which it is read in chunks."""
@@ -60,6 +61,8 @@ class Chunks:
     n_valid: int
     thinning: int
     part: Measurements
+
+    __repr__ = brief
 
     def __iter__(self) -> Iterator[Measurements]:
         for table in _chosen(self.path, self.rows, self.where):

@@ -13,6 +13,7 @@ from fitmat.measurements.large.stream import Stream
 from fitmat.measurements.neighbours import leave_one_out
 from fitmat.measurements.noise import Noise, law, measured_noise, of_laws, seen_levels
 from fitmat.measurements.samples import Measurements
+from fitmat.text import brief
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -30,6 +31,8 @@ class Scatter:
     laws: Float[np.ndarray, "c 2"]
     tops: Float[np.ndarray, " c"]
     levels: Float[np.ndarray, "n c"]
+
+    __repr__ = brief
 
     def of(self, chunk: Measurements) -> Noise:
         """σ of a chunk's rows."""

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from fitmat.measurements.samples import Measurements
+from fitmat.text import brief
 
 CHUNK = 200_000
 """Most rows of a block."""
@@ -70,6 +71,8 @@ class Held:
     n_valid: int
     part: Measurements
     thinning: int
+
+    __repr__ = brief
 
     def __iter__(self) -> Iterator[Measurements]:
         for first in range(0, self.n_samples, CHUNK):

@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float, Int
 from fitmat.errors import ReadError
 from fitmat.maths.directions import from_angles
 from fitmat.measurements.parsing.contents import shown as shown
+from fitmat.text import brief
 
 _BOM = b"\xef\xbb\xbf"
 _WORD = r"^[A-Za-z]"
@@ -42,6 +43,8 @@ class Lines:
     source: str
     number: Int[np.ndarray, " k"]
     text: pl.Series
+
+    __repr__ = brief
 
     def where(self, row: int) -> str:
         """File and line, as messages begin."""
@@ -116,6 +119,8 @@ class Sections:
     rest: pl.Series
     start: Int[np.ndarray, " k_1"]
     number: Float[np.ndarray, " m"]
+
+    __repr__ = brief
 
     def at(self, *keys: str) -> Int[np.ndarray, " j"]:
         """Which sections have one of these keywords."""

@@ -10,6 +10,7 @@ import polars as pl
 from jaxtyping import Bool, Float
 
 from fitmat.measurements.parsing.angles import ROUNDING
+from fitmat.text import brief
 
 HORIZON = np.sin(ROUNDING)
 """Cosine of a zenith angle at or below which a direction counts as horizontal."""
@@ -51,6 +52,8 @@ class Recording:
     doubts: dict[str, Bool[np.ndarray, "n c"]] = dataclasses.field(default_factory=dict)
     notes: tuple[str, ...] = ()
     distinct: bool = False
+
+    __repr__ = brief
 
 
 def pivot(long: Recording, labels: np.ndarray) -> Recording:

@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Int
 
 from fitmat.errors import ReadError
 from fitmat.measurements.parsing.contents import listed, shown
+from fitmat.text import brief
 
 ERROR_VALUES = ("#n/a", "#div/0!", "#ref!", "#value!", "#name?", "#num!", "#null!")
 """What spreadsheets write into a cell that they cannot compute, in lower case."""
@@ -40,6 +41,8 @@ class Table:
     cells: pl.DataFrame
     lines: Int[np.ndarray, " n"]
     notes: tuple[str, ...] = ()
+
+    __repr__ = brief
 
     def where(self, row: int) -> str:
         """File and line of a row, as messages begin."""

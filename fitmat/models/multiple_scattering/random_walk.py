@@ -36,6 +36,7 @@ from fitmat.models.multiple_scattering.surface import (
     visible_normal,
 )
 from fitmat.models.terms.fresnel import dielectric
+from fitmat.text import brief
 
 MOST_BOUNCES = 256
 """A path is cut after so many collisions; the energy that it still carried is reported."""
@@ -68,6 +69,8 @@ class MonteCarlo:
     standard_error: Float[np.ndarray, "n c"]
     omitted: Float[np.ndarray, " n"]
     samples: int
+
+    __repr__ = brief
 
 
 class Escaped(NamedTuple):
@@ -158,6 +161,8 @@ class Plan:
     wo: Float[Array, "3 n 1"]
     orders: Orders
     static: Static
+
+    __repr__ = brief
 
     def result(self, sums: Sums, divisor: Float[Array, "n 1"] | float = 1.0) -> MonteCarlo:
         """Means over the lanes and their standard errors; lanes are independent, the paths of one need not be."""
