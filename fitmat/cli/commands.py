@@ -19,6 +19,7 @@ from fitmat.cli.flags.files import (
     OutFlag,
     PlotFlag,
     ReplaceFlag,
+    ReplacePlotFlag,
 )
 from fitmat.cli.flags.fitting import (
     CheckPosteriorFlag,
@@ -58,6 +59,7 @@ NOT_CONVERGED = 3
 
 app = typer.Typer(
     no_args_is_help=True,
+    context_settings={"help_option_names": ["--help", "-h"]},
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
     epilog="Examples: [bold]fitmat fit measurements.csv[/bold] writes measurements-fitmat/report.html; "
@@ -212,7 +214,7 @@ def check(
     instrument: Any,
     file: FileFlag,
     plot: PlotFlag = None,
-    force: ReplaceFlag = False,
+    force: ReplacePlotFlag = False,
     json_: JsonFlag = False,
 ) -> None:
     """Describe a file before any fit: what was measured where, how consistently, and what can be learnt from it."""
@@ -283,7 +285,7 @@ def design(
     kind: KindFlag = "sample",
     count: CountFlag = 5,
     plot: DesignPlotFlag = None,
-    force: ReplaceFlag = False,
+    force: ReplacePlotFlag = False,
     json_: JsonFlag = False,
     seed: SeedFlag = 0,
     fix: FixFlag = None,

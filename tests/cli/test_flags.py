@@ -53,9 +53,17 @@ def test_laws_are_measured_of_what_is_named(name: str | None, lobes: set[str]) -
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_flag_explains_itself(name: str) -> None:
     """In its own words, beyond what its name says."""
-    ended = run(name, "--help")
+    ended = run(name, "-h")
     assert ended.exit_code == 0
+    assert ended.output == run(name, "--help").output
     assert all(len(p.help or "") > len("Replace the file") for p in COMMANDS[name].params)
+
+
+def test_help_names_the_extras_whole() -> None:
+    """Square brackets are markup unless they are escaped."""
+    said = " ".join(run("fit", "--help").output.split())
+    assert "pip install 'fitmat[nuts]'" in said
+    assert "pip install 'fitmat[materials]'" in said
 
 
 def test_the_version_is_the_package() -> None:

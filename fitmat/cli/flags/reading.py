@@ -60,7 +60,7 @@ SpecularAzimuthFlag = Annotated[
 IntensityFlag = Annotated[
     float | None,
     typer.Option(
-        help="Of the source, in W/sr, where the file holds radiances.",
+        help="Intensity of the source in W/sr, where the file holds radiances; with --distance.",
         metavar="X",
         show_default=False,
         rich_help_panel=FILE,
@@ -70,7 +70,7 @@ IntensityFlag = Annotated[
 DistanceFlag = Annotated[
     float | None,
     typer.Option(
-        help="Of the source from the sample, in m, with --intensity.",
+        help="Distance of the source from the sample in m; with --intensity.",
         metavar="X",
         show_default=False,
         rich_help_panel=FILE,
@@ -101,7 +101,8 @@ UnknownScaleFlag = Annotated[
     bool,
     typer.Option(
         "--unknown-scale",
-        help="The values are right but for one common factor: fit it.",
+        help="The values are right but for one common factor: fit it. Not beside what says it: --calibration, --panel, "
+        "--intensity.",
         rich_help_panel=INSTRUMENT,
     ),
 ]
