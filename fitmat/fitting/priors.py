@@ -42,6 +42,9 @@ def prepare_prior(
     every, places = coordinates(model), {e.name: e for e in entries(model)}
     mean, precision = np.zeros(len(vector(model))), np.zeros(len(vector(model)))
     discrepancy = 0.0
+    if instrument.calibration and "scale" in given:
+        got = f"prior of scale beside the instrument's calibration = {instrument.calibration:g}"
+        raise ModelError(f"{got}, expected one of the two. Leave one out.")
     if instrument.calibration:
         precision[places["scale"].place] = 1.0 / instrument.calibration
     for name, pair in given.items():

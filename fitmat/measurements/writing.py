@@ -49,8 +49,9 @@ def write(measurements: Measurements, path: str | os.PathLike[str], force: bool 
 
 def losses(measurements: Measurements, path: str | os.PathLike[str]) -> tuple[str, ...]:
     """What the format of that suffix cannot hold of the measurements, in sentences."""
-    told = getattr(_room(Path(path)), "losses", None)
-    return told(measurements) if told else ()
+    told, said = getattr(_room(Path(path)), "losses", None), str(measurements.instrument)
+    beside = (f"No file says this of its values, say it again when it is read: {said}",) if said else ()
+    return (*(told(measurements) if told else ()), *beside)
 
 
 def _room(target: Path) -> Any:

@@ -1,5 +1,7 @@
 """Priors against conjugate closed forms and SciPy's distributions: stated, drawn, shown, refused."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -131,3 +133,9 @@ def test_priors_that_could_change_nothing_are_refused(made: fm.Measurements, tol
 def test_a_model_has_its_own_masking(made: fm.Measurements) -> None:
     with pytest.raises(ModelError, match="masking = 'separable' beside a model, expected it with a name"):
         fm.fit(made, fm.model("ggx"), masking="separable")
+
+
+def test_a_calibration_is_the_prior_of_the_scale(made: fm.Measurements) -> None:
+    known = dataclasses.replace(made, instrument=fm.Instrument(calibration=0.03))
+    with pytest.raises(ModelError, match=r"prior of scale beside the instrument's calibration = 0\.03, expected one"):
+        fm.fit(known, "lambert", priors={"scale": (1.0, 0.1)})

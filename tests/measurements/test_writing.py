@@ -182,3 +182,10 @@ def test_text_of_a_format_is_written_and_what_it_loses_is_warned_of(tmp_path, mo
         path = write(in_plane(), tmp_path / f"table{suffix}")
     assert path.read_text(encoding="utf-8") == "30 θ\n"
     assert caught[0].filename == __file__
+
+
+def test_what_the_instrument_adds_is_not_in_the_file(tmp_path: Path) -> None:
+    """A table of values known but for a factor would be read as sr⁻¹."""
+    table = {"theta_i": [30.0, 30.0], "theta_o": [10.0, 20.0], "brdf": [500.0, 600.0]}
+    with pytest.warns(UserWarning, match=r"say it again when it is read: Instrument: scale unknown\."):
+        write(read(table, unknown_scale=True), tmp_path / "scaled.csv")
