@@ -60,7 +60,6 @@ class Rows:
     chunks: Stream
     known: Scatter
     prepared: tuple[Data, ...] | None
-
     __repr__ = brief
 
 

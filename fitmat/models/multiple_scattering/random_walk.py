@@ -69,7 +69,6 @@ class MonteCarlo:
     standard_error: Float[np.ndarray, "n c"]
     omitted: Float[np.ndarray, " n"]
     samples: int
-
     __repr__ = brief
 
 
@@ -123,7 +122,6 @@ def albedo_walk(surface: Surface, wi: ArrayLike, *, samples: int, seed: int) -> 
     both = plan.result(
         _evaluate(surface, plan.wi, None, plan.orders, jax.random.key(seed, impl=GENERATOR), plan.static)
     )
-
     sides = [(a[:, :-1], a[:, -1:]) for a in (both.value, both.standard_error)]
     return Escaped(*(MonteCarlo(value, error, both.omitted, both.samples) for value, error in zip(*sides, strict=True)))
 
@@ -161,7 +159,6 @@ class Plan:
     wo: Float[Array, "3 n 1"]
     orders: Orders
     static: Static
-
     __repr__ = brief
 
     def result(self, sums: Sums, divisor: Float[Array, "n 1"] | float = 1.0) -> MonteCarlo:
@@ -180,8 +177,6 @@ def plan_paths(wi: ArrayLike, wo: ArrayLike, *, samples: int, order: int | None)
         if wrong.any():
             row = int(np.argmax(wrong))
             raise ModelError(f"{label} row {row} is {w[row]}: expected a unit vector above the surface, z > 0.")
-    if samples < 2:
-        raise ModelError(f"samples = {samples}: expected at least 2, or there is no standard error.")
     if order is not None and not 1 <= order <= MOST_BOUNCES:
         raise ModelError(f"order = {order}: expected 1 to {MOST_BOUNCES}, or None for all orders.")
     lanes = min(max(LANES // len(pair[0]), FEWEST), samples)

@@ -89,7 +89,7 @@ def refuse_kinds(surface: object, samples: object, seed: object, order: object) 
         FitmatError: names the argument.
     """
     arguments.kind("surface", surface, Surface)
-    arguments.whole("samples", samples)
+    arguments.whole("samples", samples, 2)  # of one there is no standard error
     arguments.whole("seed", seed)
     arguments.whole("order", order, 1, optional=True)
 

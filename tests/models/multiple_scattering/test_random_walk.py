@@ -11,7 +11,7 @@ from oracles.multiscatter import REFLECTED, SHARES, VALUES, Value
 from scipy.special import erf
 from selection import always
 
-from fitmat.errors import ModelError
+from fitmat.errors import FitmatError, ModelError
 from fitmat.maths.directions import from_angles
 from fitmat.maths.quadrature import lobe_rule
 from fitmat.models.base import evaluate
@@ -316,10 +316,10 @@ def test_wrong_input_is_refused(estimator: Estimator) -> None:
         estimator(surface, WI, WO[:4], samples=10, seed=0)
     with pytest.raises(ModelError, match=r"wo row 1 is .* expected a unit vector above the surface"):
         estimator(surface, WI, WO * np.array([[1], [-1], [1], [1], [1]]), samples=10, seed=0)
-    with pytest.raises(ModelError, match="samples = 1: expected at least 2"):
+    with pytest.raises(FitmatError, match=r"samples is 1, expected a whole number of at least 2\."):
         estimator(surface, WI, WO, samples=1, seed=0)
-    with pytest.raises(ModelError, match="order = 0: expected 1 to 256"):
-        estimator(surface, WI, WO, samples=10, seed=0, order=0)
+    with pytest.raises(ModelError, match="order = 257: expected 1 to 256"):
+        estimator(surface, WI, WO, samples=10, seed=0, order=257)
 
 
 def test_surfaces_that_cannot_be_walked_are_refused() -> None:
