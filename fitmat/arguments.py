@@ -5,7 +5,7 @@ It knows no class of fitmat but by name, and judges no number beyond its range.
 
 from collections.abc import Callable, Iterable, Mapping
 from numbers import Integral, Real
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from jaxtyping import Float
@@ -129,9 +129,8 @@ def numbers(
         refuse(name, given, wanted)
     if single and not (found.ndim == 0 and np.isfinite(found)):
         refuse(name, given, wanted)
-    outside = ~((found >= low) & (found <= high))
-    if limited and outside.any():
-        refuse(name, float(found[outside][0]), wanted)
+    for worst in found[~((found >= low) & (found <= high))].flat[: int(limited)]:
+        refuse(name, float(worst), wanted)
     return found
 
 
@@ -161,7 +160,7 @@ def _within(found: np.ndarray, largest: float, signed: bool) -> np.ndarray:
     return (np.abs(found) <= largest + ROUNDING) & (signed | (found >= 0))
 
 
-def refuse(name: str, given: object, wanted: str) -> None:
+def refuse(name: str, given: object, wanted: str) -> NoReturn:
     """Stop: an argument is not what was wanted.
 
     Raises:

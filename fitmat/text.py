@@ -75,7 +75,7 @@ def plain(thing: Any) -> Any:
     return None if isinstance(thing, float) and not math.isfinite(thing) else thing
 
 
-def brief(thing: Any) -> str:
+def brief(self: Any) -> str:
     """What a prompt shows of a result: its own words where it has some, else its fields; arrays by their shape.
 
     Example:
@@ -87,11 +87,11 @@ def brief(thing: Any) -> str:
         >>> Curve("kd", np.zeros((5, 3)))
         Curve(name='kd', values=array (5, 3))
     """
-    called = type(thing).__name__
-    if type(thing).__str__ is not object.__str__:
-        whole = f"{called}: {thing}"
+    called = type(self).__name__
+    if type(self).__str__ is not object.__str__:
+        whole = f"{called}: {self}"
     else:
-        parts = (f"{f.name}={_shown(getattr(thing, f.name))}" for f in dataclasses.fields(thing))
+        parts = (f"{f.name}={_shown(getattr(self, f.name))}" for f in dataclasses.fields(self))
         whole = f"{called}({', '.join(parts)})"
     return whole if len(whole) <= MOST_SHOWN else f"{whole[:MOST_SHOWN].rstrip()} … (print it for all)"
 

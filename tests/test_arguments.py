@@ -37,7 +37,7 @@ def test_degrees_are_asked_about(call, message) -> None:
 
 def test_rounded_right_angles_are_right_angles() -> None:
     """float32 writes π/2 as 1.5707964, 4e-8 too large."""
-    found = fm.from_arrays(np.float32([np.pi / 2, 0.5]), 0.5, [1.0, 1.0])
+    found = fm.from_arrays(np.array([np.pi / 2, 0.5], np.float32), 0.5, [1.0, 1.0])
     assert found.n_samples == 2
 
 
@@ -45,7 +45,8 @@ def test_what_is_masked_or_missing_is_masked() -> None:
     """NumPy's masked arrays, None and NaN: no datum is made of what stands behind the mask."""
     value = np.ma.array([1.0, 2.0, 3.0], mask=[False, True, False])
     assert fm.from_arrays(0.5, [0.1, 0.2, 0.3], value).valid[:, 0].tolist() == [True, False, True]
-    assert fm.from_arrays(0.5, [0.1, np.nan, 0.3], [1.0, 2.0, None]).valid[:, 0].tolist() == [True, False, False]
+    some: Any = [1.0, 2.0, None]
+    assert fm.from_arrays(0.5, [0.1, np.nan, 0.3], some).valid[:, 0].tolist() == [True, False, False]
 
 
 MEASURED = fm.from_arrays(0.5, [0.1, 0.2, 0.3], [1.0, 1.0, 1.0])

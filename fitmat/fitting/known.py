@@ -53,7 +53,7 @@ def of_material(name: str, material: str, channels: tuple[str, ...]) -> Known:
     covers, base = parts[: name.count(OVER)], parts[name.count(OVER) :]
     name = OVER.join([*covers, "+".join(renamed.get(part, part) for part in base)])
     f0, f82 = f0_f82_from_ior(eta, kappa)
-    values = dict(zip(OPTICAL, (eta, kappa, f0, f82), strict=True))
+    values: dict[str, np.ndarray] = dict(zip(OPTICAL, (eta, kappa, f0, f82), strict=True))
     names = {e.name: e for e in entries(model(name, channels=len(channels)))}
     known = {}
     for part in renamed.values():

@@ -40,7 +40,7 @@ class Instrument:
         limits = {"source": WIDEST, "receiver": WIDEST, "calibration": UNKNOWN_SCALE, "dark": 1.0}
         for name, upper in limits.items():
             value = getattr(self, name)
-            if value is None and name == "dark":
+            if name == "dark" and self.dark is None:
                 continue
             arguments.real(f"{name} of the instrument", value)
             if not (np.isfinite(value) and 0 <= value <= upper):
