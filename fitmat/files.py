@@ -9,24 +9,29 @@ import os
 import shutil
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from fitmat.errors import OutputError
 
-DRAFT = ".fitmat-"
-"""How the names of unfinished folders begin."""
+WORK = ".fitmat-"
+"""How the names of folders begin in which something is made; they hold nothing but `_LOCK` and `_DRAFT`."""
 
 ABANDONED = 7 * 24 * 3600.0
-"""Seconds after which an unfinished folder is nobody's any more."""
+"""Seconds after which such a folder, left by a killed run, is removed by a run of something else."""
+
+_LOCK, _DRAFT = "lock", "draft"
+_TRIES, _WAIT = 10, 0.02
 
 
 def default(source: Path) -> Path:
-    """`NAME-fitmat` beside the input, or the first `NAME-fitmat-2`, `-3`, … that does not exist."""
-    first = source.parent / f"{source.stem}-fitmat"
-    if not os.path.exists(first):
-        return first
-    return next(p for k in itertools.count(2) if not os.path.exists(p := first.with_name(f"{first.name}-{k}")))
+    """`NAME-fitmat` beside the input, or the first `NAME-fitmat-2`, `-3`, … that neither exists nor is being made."""
+    return _free(source.parent / f"{source.stem}-fitmat")
+
+
+def _free(first: Path) -> Path:
+    names = itertools.chain([first], (first.with_name(f"{first.name}-{k}") for k in itertools.count(2)))
+    return next(path for path in names if not os.path.lexists(path) and not _in_the_making(path))
 
 
 def resumed(target: Path) -> Path:
@@ -35,57 +40,182 @@ def resumed(target: Path) -> Path:
     return place.parent / f"{place.name}.resume"
 
 
-def discard(folder: Path) -> None:
-    """Remove what has served; what cannot be removed stays."""
-    shutil.rmtree(folder, ignore_errors=True)
+def abandon(draft: Path) -> None:
+    """Remove an unfinished draft of `new`, where the process is about to end."""
+    _clear(draft.parent)
 
 
 @contextlib.contextmanager
-def new(target: Path, *, force: bool = False, stale: str = "") -> Iterator[Path]:
+def new(target: Path, *, own: Callable[[Path], Sequence[str]], force: bool = False) -> Iterator[Path]:
     """A folder to write into that appears as `target`, complete, when the block ends well.
+
+    It appears by one renaming. Only where `target` holds something, files are moved into it one by one.
 
     Args:
         target: The folder to make.
+        own: Names of the files that a run wrote into a folder, last the one that tells the others; no other file is
+            replaced or removed.
         force: Replace the files of an earlier run in `target`.
-        stale: Pattern of names; of the earlier run's files that match, those that the block does not write are removed.
 
     Raises:
-        OutputError: `target` holds something and `force` is off, or the disk refuses.
+        OutputError: `target` holds something and `force` is off, another run is making it, or the disk refuses.
     """
+    place = Path(os.path.realpath(target))
+    with contextlib.ExitStack() as held:
+        try:
+            work = _work(place)
+            held.enter_context(_locked(work, target))
+            old = own(place) if _holds_anything(target, work, force) else ()
+            _sweep(work.parent)
+            draft = work / _DRAFT
+            draft.mkdir()
+        except OSError as error:
+            raise OutputError(f"cannot write {target}: {_reason(error)}; choose another place with --out.") from error
+        try:
+            yield draft
+            if work.parent == place:
+                _move_files(draft, place, old, own(draft))
+            else:
+                _move_folder(draft, place)
+        except OSError as error:
+            raise OutputError(f"cannot write {target}: {_reason(error)}; the report is not there.") from error
+
+
+def _work(target: Path) -> Path:
+    """The folder in which `target` is made: beside it, or in it where it cannot be replaced as a whole."""
+    place = Path(os.path.realpath(target))
+    beside = next(p for p in place.parents if p.exists())
+    if place.is_dir():
+        replaceable = os.access(beside, os.W_OK | os.X_OK) and beside.stat().st_dev == place.stat().st_dev
+        if not replaceable or any(place.iterdir()):
+            beside = place
+    return beside / f"{WORK}{place.name}"
+
+
+@contextlib.contextmanager
+def _locked(work: Path, target: Path) -> Iterator[None]:
+    """The folder as this process's own, without what a killed run left in it; removed at the end."""
+    handle = _lock(work)
+    if handle is None:
+        raise OutputError(f"{target} is being written by another run; wait for it, or give another --out DIR.")
     try:
-        if target.exists() and (not target.is_dir() or any(target.iterdir())) and not force:
-            raise OutputError(f"{target} already exists; give another --out DIR, or --force to replace the run in it.")
-        place = next(p for p in (target, *target.absolute().parents) if p.exists())
-        _sweep(place)
-        draft = Path(tempfile.mkdtemp(prefix=DRAFT, dir=place))
-    except OSError as error:
-        raise OutputError(f"cannot write {target}: {_reason(error)}; choose another place with --out.") from error
-    try:
-        yield draft
-        _move(draft, target, stale)
-    except OSError as error:
-        raise OutputError(f"cannot write {target}: {_reason(error)}; the report is not there.") from error
+        _remove(work / _DRAFT)
+        yield
     finally:
-        shutil.rmtree(draft, ignore_errors=True)
+        _clear(work)
+        os.close(handle)
+
+
+def _lock(work: Path) -> int | None:
+    """A handle that holds the lock as long as it is open, however the process ends; None where another process does."""
+    for _ in range(_TRIES):
+        work.mkdir(exist_ok=True)
+        with contextlib.suppress(FileNotFoundError):  # the folder's owner has just removed it
+            handle = os.open(work / _LOCK, os.O_RDWR | os.O_CREAT, 0o600)
+            if _is_taken(handle) or not _is_at(handle, work / _LOCK):
+                os.close(handle)
+            else:
+                return handle
+        time.sleep(_WAIT)
+    return None
+
+
+def _is_taken(handle: int) -> bool:
+    """Whether another process holds the lock of a file; if none does, this one does from now on."""
+    try:
+        import fcntl  # not on every system
+    except ImportError:
+        return False
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False  # a disk without locks
+    return False
+
+
+def _is_at(handle: int, path: Path) -> bool:
+    return path.exists() and os.path.samestat(os.fstat(handle), path.stat())
+
+
+def _in_the_making(target: Path) -> bool:
+    """Whether a run is making the folder."""
+    try:
+        return _is_locked(_work(target))
+    except OSError:
+        return False
+
+
+def _is_locked(work: Path) -> bool:
+    try:
+        handle = os.open(work / _LOCK, os.O_RDWR)
+    except OSError:
+        return False
+    taken = _is_taken(handle)
+    os.close(handle)
+    return taken
+
+
+def _holds_anything(target: Path, work: Path, force: bool) -> bool:
+    """Whether the target is there and not empty; refused unless it is a folder whose files may be replaced."""
+    folder = target.is_dir()
+    if not target.exists() or (folder and all(item.name == work.name for item in target.iterdir())):
+        return False
+    if not (force and folder):
+        remedy = ", or --force to replace the run in it" if folder else ""
+        raise OutputError(f"{target} already exists; give another --out DIR{remedy}.")
+    return True
 
 
 def _sweep(place: Path) -> None:
-    """Remove the drafts that killed runs left, once they are older than any run."""
-    for left in place.glob(f"{DRAFT}*"):
+    """Remove what killed runs of other things left in a folder, once it is older than any run."""
+    for left in place.glob(f"{WORK}*"):
         with contextlib.suppress(OSError):
-            if time.time() - left.stat().st_mtime > ABANDONED:
-                shutil.rmtree(left, ignore_errors=True)
+            if time.time() - left.stat().st_mtime > ABANDONED and not _is_locked(left):
+                _clear(left)
 
 
-def _move(draft: Path, target: Path, stale: str) -> None:
-    """Move the draft's files into place, and remove what is stale."""
-    target.mkdir(parents=True, exist_ok=True)
-    written = {item.name for item in draft.iterdir()}
-    for name in sorted(written):
+def _clear(work: Path) -> None:
+    """Remove a folder of drafts, if nothing else is in it; what cannot be removed stays."""
+    _remove(work / _DRAFT)
+    with contextlib.suppress(OSError):
+        (work / _LOCK).unlink(missing_ok=True)
+        work.rmdir()
+
+
+def _remove(draft: Path) -> None:
+    shutil.rmtree(draft, ignore_errors=True)
+    with contextlib.suppress(OSError):
+        draft.unlink(missing_ok=True)
+
+
+def _move_folder(draft: Path, target: Path) -> None:
+    """The draft as the target, in one step; as the next free name where somebody has made the target meanwhile."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        os.replace(draft, target)
+    except OSError:
+        if not target.exists():
+            raise
+        _move_aside(draft, target, f"{target} was made while this run went on")
+
+
+def _move_files(draft: Path, target: Path, old: Sequence[str], fresh: Sequence[str]) -> None:
+    """The draft's files into the target; what tells of the others goes last and comes first."""
+    for name in set(fresh) - set(old):
+        if os.path.lexists(target / name):
+            _move_aside(draft, target, f"{target / name} is not of an earlier run")
+    for name in old:
+        (target / name).unlink(missing_ok=True)
+    for name in reversed(fresh):
         os.replace(draft / name, target / name)
-    for old in target.glob(stale) if stale else ():
-        if old.name not in written:
-            old.unlink()
+
+
+def _move_aside(draft: Path, target: Path, why: str) -> None:
+    free = _free(target)
+    os.replace(draft, free)
+    raise OutputError(f"{why}, and stays as it is; the report is in {free}.")
 
 
 def _reason(error: OSError) -> str:
@@ -112,7 +242,7 @@ def write_bytes(path: Path, content: bytes) -> Path:
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".fitmat-", dir=path.parent, ignore_cleanup_errors=True) as folder:
+        with tempfile.TemporaryDirectory(prefix=WORK, dir=path.parent, ignore_cleanup_errors=True) as folder:
             draft = Path(folder) / "draft"
             draft.write_bytes(content)
             os.replace(draft, path)

@@ -124,13 +124,13 @@ def fit(
         from fitmat.fitting import priors
         from fitmat.models.parameters import assignments
         from fitmat.reports import page, terminal
-        from fitmat.studies.study import study
+        from fitmat.studies.study import forget, study
 
         fixed, believed = assignments(fix or [], "--fix"), priors.assignments(prior or [])
         told = {"loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
         target = out or files.default(file)
         with (
-            process.taken_away(files.new(target, force=force, stale=page.POSTERIOR.format("*"))) as draft,
+            process.taken_away(files.new(target, own=page.own, force=force)) as draft,
             programs.announced(watch.compiling),
         ):
             measurements = session.source(file, reading | {"instrument": instrument}, watch)
@@ -150,7 +150,7 @@ def fit(
             page.write(draft, found)
         programs.remember()
     if not no_mcmc:
-        files.discard(files.resumed(target))
+        forget(files.resumed(target))
     if json_:
         sys.stdout.write((target / "fit.json").read_text(encoding="utf-8"))
     else:

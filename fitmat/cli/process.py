@@ -7,13 +7,14 @@ import contextlib
 import io
 import logging
 import os
-import shutil
 import signal
 import sys
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
+
+from fitmat import files
 
 WRONG_INPUT, INTERRUPTED = 1, 130
 """Exit codes after wrong input, and after Ctrl-C."""
@@ -37,7 +38,7 @@ def leave_on_interrupt(draft: Path | None = None) -> None:
 
     def leave(number: int, frame: FrameType | None) -> None:
         if draft is not None:
-            shutil.rmtree(draft, ignore_errors=True)
+            files.abandon(draft)
         sys.stderr.write("fitmat: interrupted before the end; no report was written.\n")
         sys.stderr.flush()
         os._exit(INTERRUPTED)
@@ -56,6 +57,7 @@ def taken_away(new: contextlib.AbstractContextManager[Path]) -> Iterator[Path]:
             if asked:
                 signal.raise_signal(signal.SIGINT)
             yield draft
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is complete is moved into its place
     finally:
         leave_on_interrupt()
 

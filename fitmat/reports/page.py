@@ -16,6 +16,7 @@ import numpy as np
 from markupsafe import Markup
 
 from fitmat import arguments, files
+from fitmat.errors import OutputError
 from fitmat.fitting.result import RESULTS, Fit
 from fitmat.judgement.choice import Choice
 from fitmat.match.ablation import EXPLAINS, TERMS
@@ -36,16 +37,35 @@ if TYPE_CHECKING:
 
 DPI = 96
 CHANNELS_DRAWN = 3
-PAGE, POSTERIOR = "report.html", "posterior-{}.parquet"
+PAGE, RECORD, POSTERIOR = "report.html", "fit.json", "posterior-{}.parquet"
 
 
 def write(folder: Path, study: Study) -> None:
     """Write `report.html`, `fit.json` and one `posterior-MODEL.parquet` per model into an existing folder."""
     found = record.to_dict(study)
-    (folder / "fit.json").write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    (folder / RECORD).write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     for posterior in study.posteriors:
         posterior.save(folder / POSTERIOR.format(posterior.fit.name))
     (folder / PAGE).write_text(to_html(study), encoding="utf-8")
+
+
+def own(folder: Path) -> list[str]:
+    """Names of the files that a run wrote into a folder, last the record, which names the models of the others.
+
+    Raises:
+        OutputError: the folder has a file of such a name, and no record that says it is a run's.
+    """
+    try:
+        found = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        models = [str(fit["model"]) for fit in found["fits"] if found["fitmat"]]
+    except (OSError, ValueError, LookupError, TypeError):
+        for name in (PAGE, RECORD):
+            if os.path.lexists(folder / name):
+                why = f"{folder / name} is not known to be of an earlier run, and is not replaced"
+                raise OutputError(f"{why}; move it, or give another --out DIR.") from None
+        return []
+    names = [*(POSTERIOR.format(model) for model in models), PAGE, RECORD]
+    return [name for name in names if Path(name).name == name and os.path.lexists(folder / name)]
 
 
 def report(study: Study, folder: str | Path, *, force: bool = False) -> Path:
@@ -66,7 +86,7 @@ def report(study: Study, folder: str | Path, *, force: bool = False) -> Path:
     arguments.kind("folder", folder, str, os.PathLike)
     arguments.flags(force=force)
     target = Path(folder)
-    with files.new(target, force=force, stale=POSTERIOR.format("*")) as draft:
+    with files.new(target, own=own, force=force) as draft:
         write(draft, study)
     return target / PAGE
 

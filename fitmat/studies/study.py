@@ -3,9 +3,9 @@
 What people see of it, `reports` makes; nothing is written or printed here.
 """
 
+import contextlib
 import dataclasses
 import os
-import shutil
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -30,7 +30,7 @@ from fitmat.models.around.tilt import Tilted
 from fitmat.studies.findings import Findings, find
 from fitmat.studies.plan import DEFAULT_MODELS, Jobs, plan, refuse_unsampled
 from fitmat.text import brief
-from fitmat.uncertainty import second_sampler
+from fitmat.uncertainty import checkpoint, second_sampler
 from fitmat.uncertainty.chains import resumable_steps, sample
 from fitmat.uncertainty.laplace import laplace, laplace_each
 from fitmat.uncertainty.posterior import Posterior
@@ -221,8 +221,16 @@ def _resumable(approximate: Posterior, seed: int, kept: Path) -> int:
         return 0
     steps = resumable_steps(approximate.fit, seed=seed, checkpoint=kept)
     if not steps:
-        shutil.rmtree(kept)
+        checkpoint.discard(kept)
     return steps
+
+
+def forget(resume: Path) -> None:
+    """Remove what `study` kept to go on from, which has served; what it did not write stays."""
+    with contextlib.suppress(OSError):
+        for kept in resume.iterdir():
+            checkpoint.discard(kept)
+        resume.rmdir()
 
 
 def judge(

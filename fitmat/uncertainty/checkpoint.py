@@ -4,6 +4,7 @@ Trusts nothing that it reads: every part carries the digest of its own content, 
 sampled. Knows no model, draws nothing, and never stops the run that it serves.
 """
 
+import contextlib
 import dataclasses
 import hashlib
 import io
@@ -22,8 +23,10 @@ from fitmat.text import brief
 SHARE = 0.02
 """Writing takes at most this fraction of the time: where a disk is slow, parts become longer."""
 
-PART = ".part"
-"""How the name of a part ends; before it stands the step at which the part ends."""
+PART = "{:08d}.part"
+"""Name of a part, by the step at which it ends."""
+
+_PARTS, _DRAFT = "[0-9]" * 8 + ".part", "draft"
 
 _DIGEST = hashlib.sha256().digest_size
 
@@ -69,7 +72,7 @@ class Checkpoint:
         self._cost, self._written, self._writable = 0.0, 0.0, True
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            parts = [(path, path.read_bytes()) for path in sorted(folder.glob(f"*{PART}"))]
+            parts = [(path, path.read_bytes()) for path in sorted(folder.glob(_PARTS))]
         except OSError as error:
             raise OutputError(f"{folder}: no place for checkpoints ({error.strerror}); choose another.") from error
         self.saved = self._joined(parts)
@@ -114,13 +117,13 @@ class Checkpoint:
         if not (self._writable and due and backend.iteration > self._steps):
             return
         content = self._content(backend, goal)
-        draft = self._folder / "draft"
+        draft = self._folder / _DRAFT
         try:
             with draft.open("wb") as file:
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
-            os.replace(draft, self._folder / f"{backend.iteration:08d}{PART}")
+            os.replace(draft, self._folder / PART.format(backend.iteration))
         except OSError as error:
             self._writable = False
             words = f"{self._folder}: no further checkpoints ({error.strerror}); sampling goes on without."
@@ -147,6 +150,14 @@ class Checkpoint:
         )
         content = memory.getvalue()
         return hashlib.sha256(content).digest() + content
+
+
+def discard(folder: Path) -> None:
+    """Remove the parts of a run, and the folder if there is nothing else in it; what cannot be removed stays."""
+    with contextlib.suppress(OSError):
+        for path in (*folder.glob(_PARTS), folder / _DRAFT):
+            path.unlink(missing_ok=True)
+        folder.rmdir()
 
 
 def _saved(parts: list[dict[str, np.ndarray]]) -> Saved:

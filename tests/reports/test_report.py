@@ -205,6 +205,27 @@ def test_report_makes_every_file(studied, tmp_path):
     np.testing.assert_array_equal(draws["alpha"].to_numpy(), posterior.values[:, -2])
 
 
+def test_only_the_files_of_a_run_are_its_own(tmp_path):
+    """Those that its record names; a page or a record without that is somebody's."""
+    (tmp_path / "fit.json").write_text(
+        '{"fitmat": "0.1", "fits": [{"model": "ggx"}, {"model": "../x"}, {"model": "lost"}]}'
+    )
+    for name in ("report.html", "posterior-ggx.parquet", "posterior-mine.parquet", "posterior-ggx.nc", "notes.txt"):
+        (tmp_path / name).touch()
+    assert page.own(tmp_path) == ["posterior-ggx.parquet", "report.html", "fit.json"]
+    for content in ("{}", "torn", '{"fits": [{"model": "ggx"}]}', "[1]"):
+        (tmp_path / "fit.json").write_text(content)
+        with pytest.raises(
+            OutputError, match=r"report\.html is not known to be of an earlier run, .*; move it, or give"
+        ):
+            page.own(tmp_path)
+    (tmp_path / "report.html").unlink()
+    with pytest.raises(OutputError, match=r"fit\.json is not known to be of an earlier run"):
+        page.own(tmp_path)
+    (tmp_path / "fit.json").unlink()
+    assert page.own(tmp_path) == []
+
+
 @pytest.mark.parametrize(
     ("value", "sd", "text"),
     [

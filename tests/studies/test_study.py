@@ -206,3 +206,18 @@ def test_a_prompt_shows_what_a_result_is(studied: Study) -> None:
     assert studied.match is not None
     assert repr(studied.match) == f"Match: {studied.match.verdict}"
     assert "ks" in repr(studied.findings[0].fit)
+
+
+def test_what_a_run_kept_to_go_on_is_removed_and_nothing_else(tmp_path: Path) -> None:
+    """Parts of models, also of those that an earlier run sampled; not the notes of a person beside them."""
+    for model in NAMES:
+        (tmp_path / "x.resume" / model).mkdir(parents=True)
+        (tmp_path / "x.resume" / model / "00000050.part").touch()
+    notes = tmp_path / "x.resume" / "mine.txt"
+    notes.write_text("mine")
+    room.forget(tmp_path / "x.resume")
+    assert list(notes.parent.iterdir()) == [notes]
+    notes.unlink()
+    room.forget(tmp_path / "x.resume")
+    room.forget(tmp_path / "x.resume")
+    assert list(tmp_path.iterdir()) == []

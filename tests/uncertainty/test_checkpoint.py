@@ -226,3 +226,20 @@ def test_a_slow_disk_gets_fewer_parts(
     monkeypatch.setattr(checkpoint.os, "fsync", lambda _: clock.append(clock.pop() + 0.3))
     assert_same(run(fit, tmp_path), whole)
     assert [part.name for part in parts(tmp_path)] == ["00000050.part", "00000250.part"]
+
+
+def test_only_parts_are_removed(kept: Path) -> None:
+    """What somebody put beside them stays, also where its name ends as theirs do."""
+    for name in ("mine.txt", "mine.part"):
+        (kept / name).write_text("mine")
+    checkpoint.discard(kept)
+    assert sorted(path.name for path in kept.iterdir()) == ["mine.part", "mine.txt"]
+    for path in kept.iterdir():
+        path.unlink()
+    checkpoint.discard(kept)
+    assert not kept.exists()
+
+
+def test_a_file_that_is_no_part_is_not_read_as_one(fit: Fit, whole: Posterior, kept: Path) -> None:
+    (kept / "mine.part").write_text("mine")
+    assert_same(run(fit, kept), whole)  # warnings are errors
