@@ -5,30 +5,28 @@ It finds nothing itself.
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from fitmat.judgement.examination.examining import Examination, examine
-from fitmat.measurements.samples import Measurements
-from fitmat.reports.pictures import refuse_picture, write_picture
+from fitmat.judgement.examination.examining import Examination
+from fitmat.reports.pictures import write_picture
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
-def check(measurements: Measurements, picture: Path | None, *, force: bool) -> Examination:
-    """Examine measurements and draw them.
-
-    Args:
-        measurements: What to examine.
-        picture: The picture to write, or None.
-        force: Replace it where it exists.
+def draw(found: Examination, picture: Path) -> None:
+    """Draw what was found.
 
     Raises:
-        OutputError: as `refuse_picture` and `write_picture`.
+        OutputError: as `write_picture`.
     """
-    refuse_picture(picture, force=force)
-    found = examine(measurements)
-    if picture is not None:
+
+    def drawn() -> "Figure":
         from fitmat.reports.examination_plots import examination
 
-        write_picture(examination(found), picture)
-    return found
+        return examination(found)
+
+    write_picture(drawn, picture)
 
 
 def as_json(found: Examination) -> str:

@@ -68,7 +68,8 @@ app = typer.Typer(
     help="Turn measured reflectance into a material you can trust: fitted BRDF models, honest uncertainties, and how "
     "closely the empirical Phong model matches the microfacet model.\n\n"
     "Exit codes: 0 all fits converged; 1 wrong input; 2 wrong usage; 3 a fit ended otherwise (the report is written); "
-    "130 stopped with Ctrl-C before there was anything to report.",
+    "130 stopped with Ctrl-C before there was anything to report. A picture of the report that "
+    "cannot be drawn is said and changes none of these: the numbers are saved first.",
 )
 
 
@@ -147,14 +148,16 @@ def fit(
                 **told,
             )
             watch("writing the report", 0, 0)
-            page.write(draft, found)
+            missing = page.write(draft, found)
         programs.remember()
     if not no_mcmc:
         forget(files.resumed(target))
     if json_:
         sys.stdout.write((target / "fit.json").read_text(encoding="utf-8"))
     else:
-        terminal.show(found, target)
+        terminal.show(found, target / (page.PAGE if (target / page.PAGE).exists() else page.RECORD))
+    if missing:
+        typer.echo(f"{target}: {missing}", err=True)
     if (kept := program_files.kept()).why:
         typer.echo(kept.words, err=True)
     if any(p.fit.result != "converged" or p.interrupted for p in found.posteriors):
@@ -220,11 +223,16 @@ def check(
     """Describe a file before any fit: what was measured where, how consistently, and what can be learnt from it."""
     process.set_up()
     from fitmat.cli import check
+    from fitmat.judgement.examination.examining import examine
     from fitmat.measurements.reader import read
+    from fitmat.reports.pictures import refuse_picture
 
-    found = check.check(read(file, **reading, instrument=instrument), plot, force=force)
+    refuse_picture(plot, force=force)
+    found = examine(read(file, **reading, instrument=instrument))
     typer.echo(check.as_json(found) if json_ else str(found))
-    if plot is None and not json_:
+    if plot is not None:
+        check.draw(found, plot)
+    elif not json_:
         typer.echo(f"See what was measured where: fitmat check {file} --plot coverage.png")
 
 
@@ -299,16 +307,20 @@ def design(
         from fitmat.maths import programs
         from fitmat.measurements.reader import read
         from fitmat.models.parameters import assignments
+        from fitmat.reports.pictures import refuse_picture
         from fitmat.studies.plan import plan
         from fitmat.studies.study import fit_each
 
+        refuse_picture(plot, force=force)
         measurements = read(file, **reading, instrument=instrument)
         jobs = plan(models, measurements, fixed=assignments(fix or [], "--fix"))
         with programs.announced(watch.compiling):
             posteriors = fit_each(measurements, jobs, seed=seed, progress=watch)
             watch("looking for the next angles", 0, 0)
-            found = design.propose(posteriors, for_, kind=kind, count=count, picture=plot, force=force)
+            found = design.propose(posteriors, for_, kind=kind, count=count)
     typer.echo(design.as_json(found) if json_ else design.as_text(found))
+    if plot is not None:
+        design.draw(found, plot)
 
 
 @app.command(cls=Command)

@@ -12,7 +12,7 @@ import numpy as np
 
 from fitmat.judgement.design.design import MATCH, Design, Proposal, next_angles
 from fitmat.match.match import is_microfacet
-from fitmat.reports.pictures import refuse_picture, write_picture
+from fitmat.reports.pictures import write_picture
 from fitmat.text import plain, text_table
 from fitmat.uncertainty.posterior import Posterior
 
@@ -26,10 +26,8 @@ def propose(
     *,
     kind: Literal["sample", "curve"] = "sample",
     count: int = 5,
-    picture: Path | None = None,
-    force: bool = False,
 ) -> Design:
-    """Find the next measurements and draw them.
+    """Find the next measurements.
 
     Args:
         posteriors: Of fits to the same measurements; the design is for the first that has the target, the microfacet
@@ -37,26 +35,32 @@ def propose(
         target: A parameter, "match", or None for all parameters.
         kind: Single samples or whole curves.
         count: How many.
-        picture: The picture to write, or None.
-        force: Replace it where it exists.
 
     Raises:
         FitmatError: as `next_angles`.
-        OutputError: as `refuse_picture` and `write_picture`.
     """
-    refuse_picture(picture, force=force)
     ordered = sorted(posteriors, key=lambda p: not is_microfacet(p.fit.name))
     having = [p for p in ordered if any(target == e.name for e in p.fit.entries)]
     first = (having or ordered)[0]
     against = next((p for p in ordered if p is not first), None) if target == MATCH else None
-    found = next_angles(first, target=target, against=against, kind=kind, count=count)
-    if picture is not None:
+    return next_angles(first, target=target, against=against, kind=kind, count=count)
+
+
+def draw(found: Design, picture: Path) -> None:
+    """Draw what each of the next measurements is worth.
+
+    Raises:
+        OutputError: as `write_picture`.
+    """
+
+    def drawn() -> "Figure":
         from fitmat.reports import plot
 
         ax = plot.new_axes(5.6, 4.4)
         plot.design(found, ax)
-        write_picture(cast("Figure", ax.figure), picture)
-    return found
+        return cast("Figure", ax.figure)
+
+    write_picture(drawn, picture)
 
 
 def as_json(found: Design) -> str:

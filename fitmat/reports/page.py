@@ -1,12 +1,14 @@
 """The report: one HTML page, one JSON object and the posteriors, written together or not at all.
 
-Formats numbers that other rooms computed; computes none.
+Formats numbers that other rooms computed; computes none. The numbers are on disk before anything is drawn.
 """
 
 import base64
 import io
 import json
 import os
+import warnings
+from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,7 +28,9 @@ from fitmat.match.discernibility import SEPARATED
 from fitmat.match.match import Match
 from fitmat.match.regions import GRAZING_DEG, REGIONS
 from fitmat.match.sentences import CLOSE, SIMILAR
+from fitmat.measurements.parsing.contents import shown
 from fitmat.models.metrics import METRICS
+from fitmat.reports.pictures import reason
 from fitmat.reports.rows import parameter_rows, prior_rows
 from fitmat.studies import record
 from fitmat.studies.study import Study
@@ -35,18 +39,30 @@ from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, VERD
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Draw = Callable[[], "Figure"]
+"""Draws a picture when it is called."""
+
 DPI = 96
 CHANNELS_DRAWN = 3
 PAGE, RECORD, POSTERIOR = "report.html", "fit.json", "posterior-{}.parquet"
 
 
-def write(folder: Path, study: Study) -> None:
-    """Write `report.html`, `fit.json` and one `posterior-MODEL.parquet` per model into an existing folder."""
+def write(folder: Path, study: Study) -> str:
+    """Write `fit.json`, one `posterior-MODEL.parquet` per model, and then `report.html` into an existing folder.
+
+    Returns:
+        What is missing because it could not be drawn or written, in one sentence; "" where nothing is.
+    """
     found = record.to_dict(study)
     (folder / RECORD).write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     for posterior in study.posteriors:
         posterior.save(folder / POSTERIOR.format(posterior.fit.name))
-    (folder / PAGE).write_text(to_html(study), encoding="utf-8")
+    pictures = _Pictures()
+    try:
+        files.write_text(folder / PAGE, _rendered(study, pictures))
+    except Exception as error:  # the numbers stand, whatever a page or a library of pictures comes upon
+        return f"{PAGE} could not be made ({reason(error)}); the numbers are saved in {RECORD}."
+    return pictures.words
 
 
 def own(folder: Path) -> list[str]:
@@ -87,19 +103,23 @@ def report(study: Study, folder: str | Path, *, force: bool = False) -> Path:
     arguments.flags(force=force)
     target = Path(folder)
     with files.new(target, own=own, force=force) as draft:
-        write(draft, study)
+        missing = write(draft, study)
+    if missing:
+        warnings.warn(f"{target}: {missing}", stacklevel=2)
     return target / PAGE
 
 
 def to_html(study: Study) -> str:
     """The page: verdict, pictures, then numbers; pictures are embedded, nothing is fetched."""
+    return _rendered(study, _Pictures())
+
+
+def _rendered(study: Study, pictures: "_Pictures") -> str:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("fitmat.reports"), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
-    environment.filters |= {"png": _png, "subscripted": _subscripted}
+    environment.filters |= {"picture": pictures.embedded, "subscripted": _subscripted}
     findings = study.findings
-    from fitmat.reports import plot  # loads matplotlib
-
     return environment.get_template("report.html").render(
         version=version("fitmat"),
         study=study,
@@ -111,10 +131,10 @@ def to_html(study: Study) -> str:
         prior_rows=prior_rows,
         results=RESULTS,
         verdicts=VERDICTS,
-        curves=_curve_figures(study),
-        residuals=plot.residual_figure(study, _drawn(study)) if study.full else None,
+        curves=_curve_pictures(study),
+        residuals=(lambda: _plot().residual_figure(study, _drawn(study))) if study.full else None,
         enough={"tau": ENOUGH_TAU, "ess": ENOUGH_ESS, "rhat": GOOD_RHAT},
-        corners=[(p.fit.name, plot.corner(p)) for p in study.posteriors if study.full and _has_posterior(p)],
+        corners=[(p.fit.name, _corner(p)) for p in study.posteriors if study.full and _has_posterior(p)],
         **_match_parts(study.match, study.full),
         **_choice_parts(study.choice, study.full),
         identified=[found.identifiability for found in findings if found.identifiability is not None],
@@ -124,16 +144,14 @@ def to_html(study: Study) -> str:
 
 
 def _match_parts(match: Match | None, full: bool) -> dict[str, Any]:
-    """What the template says of the match, with its pictures."""
+    """What the template says of the match, and how its pictures are drawn."""
     if match is None:
         return {"match": None}
-    from fitmat.reports import plot
-
-    seen = match.perceived
+    seen, causes = match.perceived, match.ablation
     drawn = seen is not None and all(lighting.pictures is not None for lighting in seen.lightings)
     return {
         "match": match,
-        "albedo": plot.albedo(match).figure,
+        "albedo": lambda: _plot().albedo(match).figure,
         "close": CLOSE,
         "similar": SIMILAR,
         "regions": REGIONS,
@@ -142,11 +160,11 @@ def _match_parts(match: Match | None, full: bool) -> dict[str, Any]:
         "separated": SEPARATED,
         "explains": EXPLAINS,
         "grazing_deg": GRAZING_DEG,
-        "distances_figure": plot.distances(match).figure if full else None,
-        "ablation_figure": plot.ablation(match.ablation).figure if full and match.ablation is not None else None,
-        "telling_figure": plot.telling(match.telling).figure if full and match.telling.known else None,
+        "distances_figure": (lambda: _plot().distances(match).figure) if full else None,
+        "ablation_figure": (lambda: _plot().ablation(causes).figure) if full and causes is not None else None,
+        "telling_figure": (lambda: _plot().telling(match.telling).figure) if full and match.telling.known else None,
         "perceived": seen,
-        "spheres": plot.spheres(seen) if drawn and seen is not None else None,
+        "spheres": (lambda: _plot().spheres(seen)) if drawn else None,
         "just_noticeable": JUST_NOTICEABLE,
         "clearly_visible": CLEARLY_VISIBLE,
         "white_luminance": WHITE_LUMINANCE,
@@ -154,16 +172,14 @@ def _match_parts(match: Match | None, full: bool) -> dict[str, Any]:
 
 
 def _choice_parts(choice: Choice | None, full: bool) -> dict[str, Any]:
-    """What the template says of the choice, with its pictures."""
+    """What the template says of the choice, and how its pictures are drawn."""
     if choice is None or not full:
         return {"choice": choice}
-    from fitmat.reports import plot
-
     predicted = any(c.left_out is not None for c in choice.candidates)
     return {
         "choice": choice,
-        "choice_picture": plot.choice(choice).figure,
-        "left_out_picture": plot.left_out(choice).figure if predicted else None,
+        "choice_picture": lambda: _plot().choice(choice).figure,
+        "left_out_picture": (lambda: _plot().left_out(choice).figure) if predicted else None,
     }
 
 
@@ -178,12 +194,18 @@ def _left_out(fit: Fit) -> str:
     return f"{count} values left out: {fit.loss.unusable}." if fit.loss.usable is not None and count > 0 else ""
 
 
-def _curve_figures(study: Study) -> list[tuple[str, "Figure"]]:
-    """The curves of every channel that is drawn, by its name; none without a section."""
-    from fitmat.reports import plot
+def _curve_pictures(study: Study) -> list[tuple[str, Draw]]:
+    """How the curves of every channel that is drawn are drawn, by its name; none without a section."""
+
+    def curves(channel: int) -> Draw:
+        return lambda: _plot().curves(study, channel=channel)
 
     drawn = _drawn(study) if study.findings[0].curves else []
-    return [(study.measurements.channels[channel], plot.curves(study, channel=channel)) for channel in drawn]
+    return [(study.measurements.channels[channel], curves(channel)) for channel in drawn]
+
+
+def _corner(posterior: Posterior) -> Draw:
+    return lambda: _plot().corner(posterior)
 
 
 def _drawn(study: Study) -> list[int]:
@@ -200,7 +222,32 @@ def _subscripted(symbol: str) -> Markup:
     return Markup("{}<sub>{}</sub>").format(letter, below) if below else Markup("{}").format(symbol)
 
 
-def _png(figure: "Figure") -> str:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=DPI)
-    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+def _plot() -> Any:
+    """The room of pictures, which loads Matplotlib."""
+    from fitmat.reports import plot
+
+    return plot
+
+
+class _Pictures:
+    """Pictures as a page holds them; one that cannot be drawn is a sentence there, and remembered."""
+
+    def __init__(self) -> None:
+        self._lost: dict[str, list[str]] = {}
+
+    def embedded(self, draw: Draw, what: str) -> Markup:
+        """The picture that `draw` draws, or why there is none."""
+        buffer = io.BytesIO()
+        try:
+            draw().savefig(buffer, format="png", dpi=DPI)
+        except Exception as error:  # a picture is not worth the report
+            self._lost.setdefault(reason(error), []).append(shown(what, 80))
+            return Markup('<p class="warn">{} could not be drawn ({}).</p>').format(what, reason(error))
+        content = base64.b64encode(buffer.getvalue()).decode("ascii")
+        return Markup('<img src="data:image/png;base64,{}" alt="{}">').format(content, what)
+
+    @property
+    def words(self) -> str:
+        """What is missing, and why; "" where nothing is."""
+        lost = [f"{', '.join(pictures)} ({why})" for why, pictures in self._lost.items()]
+        return f"{PAGE} lacks what could not be drawn: {'; '.join(lost)}; all numbers are saved." if lost else ""

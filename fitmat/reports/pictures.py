@@ -5,11 +5,13 @@ It draws nothing.
 
 import io
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fitmat.errors import OutputError
 from fitmat.files import write_bytes
+from fitmat.measurements.parsing.contents import shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,15 +40,23 @@ def refuse_picture(path: Path | None, *, force: bool) -> None:
         raise OutputError(f"{path}: no picture, expected a name that ends in {', '.join(KINDS)}. Rename it.")
 
 
-def write_picture(figure: "Figure", path: Path) -> None:
-    """Write a figure in the format that the suffix names.
+def write_picture(draw: Callable[[], "Figure"], path: Path) -> None:
+    """Write what `draw` draws in the format that the suffix names.
 
     Raises:
-        OutputError: it cannot be written.
+        OutputError: it cannot be drawn or written.
     """
     buffer = io.BytesIO()
-    figure.savefig(buffer, format=_kind(path), dpi=DPI, bbox_inches="tight")
+    try:
+        draw().savefig(buffer, format=_kind(path), dpi=DPI, bbox_inches="tight")
+    except Exception as error:  # whatever a library of pictures comes upon
+        raise OutputError(f"{path}: could not be drawn ({reason(error)}); what was found is complete.") from error
     write_bytes(path, buffer.getvalue())
+
+
+def reason(error: Exception) -> str:
+    """Why something could not be drawn."""
+    return f"{type(error).__name__}: {shown(str(error), 120)}"
 
 
 def _kind(path: Path) -> str:

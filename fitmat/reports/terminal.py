@@ -21,12 +21,12 @@ def _say(out: Console, words: str, **how: Any) -> None:
     out.print(words, highlight=False, soft_wrap=not out.is_terminal or out.is_dumb_terminal, **how)
 
 
-def show(found: Study, folder: Path, screen: Console | None = None) -> None:
+def show(found: Study, report: Path, screen: Console | None = None) -> None:
     """Print the parameters of every model, what speaks against them, the verdict and where the report is.
 
     Args:
         found: What to show.
-        folder: Where the report is.
+        report: The page, or the record where there is no page.
         screen: Where to; stdout if None.
     """
     out = screen or Console()
@@ -52,7 +52,7 @@ def show(found: Study, folder: Path, screen: Console | None = None) -> None:
     adequate = " ".join(f"{one.name} {one.fit.adequacy}." for one in found.findings)
     for words in (*verdicts, found.match.verdict if found.match else adequate):
         _say(out, f"\n[bold]{words}[/bold]")
-    out.print(f"\nReport: {folder / 'report.html'}", markup=False, highlight=False, soft_wrap=True)
+    out.print(f"\nReport: {report}", markup=False, highlight=False, soft_wrap=True)
 
 
 def _remark(out: Console, found: Findings) -> None:

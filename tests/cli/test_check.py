@@ -125,6 +125,31 @@ def test_a_picture_is_replaced_by_force_only(run: Run, sparse: Path) -> None:
     assert sorted(os.listdir()) == ["link.png", "map.png", "sparse.csv"]
 
 
+def test_what_was_found_is_printed_before_a_picture_fails(
+    run: Run, sparse: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was asked for as a file, and there is none: 1, after the text, and the picture of before stays."""
+
+    def torn(*_: object, **__: object) -> None:
+        raise ValueError("no glyph")
+
+    said = run("check", sparse).out.partition("\nSee what")[0]
+    nowhere = run("check", sparse, "--plot", "/proc/x.png")
+    Path("map.png").write_text("before")
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", torn)
+    unsaved = run("check", sparse, "--plot", "map.png", "--force")
+    monkeypatch.setattr("fitmat.reports.examination_plots.examination", torn)
+    undrawn = run("check", sparse, "--plot", "map.png", "--force")
+    for ended in (nowhere, unsaved, undrawn):
+        assert ended.out.rstrip() == said.rstrip()
+    assert_refused(nowhere._replace(out=""), r"/proc/x\.png: cannot be written")
+    for ended in (unsaved, undrawn):
+        assert_refused(
+            ended._replace(out=""), r"map\.png: could not be drawn \(ValueError: no glyph\); what was found is"
+        )
+    assert Path("map.png").read_text() == "before"
+
+
 def test_check_out_of_process_prints_json_and_nothing_else(environment: dict[str, str], sparse: Path) -> None:
     ended = shell(environment, "check", sparse, "--json", "--plot", "map.png")
     assert (ended.returncode, ended.stderr) == (0, "")
@@ -204,7 +229,6 @@ REFUSED: dict[str, tuple[tuple[object, ...], str]] = {
     "nothing to convert": (("convert", "none.csv", "a.alta"), r"none\.csv: no such file"),
     "picture of no kind": (("check", "sparse.csv", "--plot", "map.txt"), r"map\.txt: no picture, .* png, svg, pdf"),
     "picture without suffix": (("check", "sparse.csv", "--plot", "map"), "map: no picture, expected a name that ends"),
-    "picture nowhere": (("check", "sparse.csv", "--plot", "/proc/x.png"), r"/proc/x\.png: cannot be written"),
     "format of no kind": (
         ("convert", "sparse.csv", "a.xlsx"),
         r"a\.xlsx: no format has the suffix \.xlsx, .*\.parquet",

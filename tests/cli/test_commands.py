@@ -270,6 +270,28 @@ def test_full_disk(run, tmp_path, monkeypatch, step):
     assert [path for path in tmp_path.rglob("*") if path.is_file() or path.name.startswith(".")] == []
 
 
+def test_a_run_whose_page_fails_keeps_its_numbers(run, tmp_path, monkeypatch):
+    """The fit converged: 0, one sentence, and the place of the numbers."""
+
+    def torn(*_: object, **__: object) -> None:
+        raise ValueError("no glyph")
+
+    monkeypatch.setattr("fitmat.reports.plot.curves", torn)
+    drawn = run("fit", DATA / "sparse.csv", *QUICK, "--out", tmp_path / "drawn")
+    monkeypatch.setattr("fitmat.reports.page.jinja2.Environment", torn)
+    made = run("fit", DATA / "sparse.csv", *QUICK, "--out", tmp_path / "made")
+    assert (drawn.code, made.code) == (0, 0)
+    lacks = (
+        r".*drawn: report\.html lacks what could not be drawn: Measured .* \(ValueError: no glyph\); all numbers .*\n"
+    )
+    assert re.fullmatch(lacks, beside_progress(drawn.err))
+    missing = r".*made: report\.html could not be made \(ValueError: no glyph\); the numbers are saved in fit\.json\.\n"
+    assert re.fullmatch(missing, beside_progress(made.err))
+    assert drawn.out.endswith("drawn/report.html\n")
+    assert made.out.endswith("made/fit.json\n")
+    assert json.loads((tmp_path / "made" / "fit.json").read_text())["fits"][0]["result"] == "converged"
+
+
 def test_out_is_refused_then_replaced_by_force(run, tmp_path):
     out = tmp_path / "out"
     assert run("fit", DATA / "sparse.csv", *QUICK, "--out", out).code == 0

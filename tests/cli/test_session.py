@@ -33,7 +33,7 @@ def narrow(monkeypatch):
 def test_show_fits_80_columns(posterior, tmp_path):
     written = io.StringIO()
     screen = Console(file=written, width=80, force_terminal=True, color_system=None)
-    terminal.show(Study((find(posterior, ()),)), tmp_path, screen)
+    terminal.show(Study((find(posterior, ()),)), tmp_path / "report.html", screen)
     out = written.getvalue()
     lines = out.splitlines()
     assert max(map(len, (line for line in lines if str(tmp_path) not in line))) <= 80
@@ -65,7 +65,7 @@ def test_show_names_the_outcome(posterior, capsys, tmp_path):
 def test_brackets_in_names_are_text(posterior, capsys, tmp_path):
     measurements = dataclasses.replace(posterior.fit.measurements, source="[red]x.csv", channels=("[bold]", "g", "b"))
     fit = dataclasses.replace(posterior.fit, measurements=measurements)
-    terminal.show(Study((find(dataclasses.replace(posterior, fit=fit), ()),)), tmp_path / "[dim]")
+    terminal.show(Study((find(dataclasses.replace(posterior, fit=fit), ()),)), tmp_path / "[dim]" / "report.html")
     out = capsys.readouterr().out
     assert all(text in out for text in ("[red]x.csv", "kd [bold]", "[dim]/report.html"))
 

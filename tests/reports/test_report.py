@@ -6,6 +6,7 @@ Of pictures what was drawn counts: numbers of points and lines, labels, limits; 
 import base64
 import dataclasses
 import html.parser
+import io
 import json
 import math
 import re
@@ -203,6 +204,93 @@ def test_report_makes_every_file(studied, tmp_path):
     draws, posterior = pl.read_parquet(tmp_path / names[2]), studied.posteriors[1]
     assert draws.columns[:4] == ["chain", "draw", "kd r", "kd g"]
     np.testing.assert_array_equal(draws["alpha"].to_numpy(), posterior.values[:, -2])
+
+
+PICTURES: dict[str, list[str]] = {
+    "curves": [f"Measured points with fitted curves, channel {k}" for k in "rgb"],
+    "residual_figure": ["Residuals"],
+    "albedo": ["Directional albedo"],
+    "distances": ["Distance against incidence"],
+    "ablation": ["Fall of the distance without each term"],
+    "telling": ["Difference against noise"],
+    "spheres": ["Lit spheres of both models and the map of their colour difference"],
+    "choice": ["How far each model is behind the best"],
+    "left_out": ["Errors of incidences left out"],
+    "corner": [f"Corner plot of {name}" for name in NAMES],
+}
+"""Functions of `plot`, and what a page calls that which they draw."""
+
+
+def torn(*_: object, **__: object) -> None:
+    raise ValueError("no\nglyph")
+
+
+class Blank:
+    """Stands for a figure and for its axes; drawing all of a page takes seconds."""
+
+    def __init__(self, *_: object, **__: object) -> None:
+        self.figure = self
+
+    def savefig(self, file: io.BytesIO, **_: object) -> None:
+        """Write what a page embeds."""
+        file.write(b"PNG")
+
+
+class Unsaved(Blank):
+    """A figure that fails when it is saved, as texts that Matplotlib cannot set do."""
+
+    savefig = torn
+
+
+@pytest.fixture
+def blank(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every picture is drawn, at no cost."""
+    for name in PICTURES:
+        monkeypatch.setattr(plot, name, Blank)
+
+
+@pytest.mark.parametrize(("name", "lost"), PICTURES.items(), ids=PICTURES)
+def test_a_picture_that_fails_is_a_sentence(studied, tmp_path, monkeypatch, blank, name, lost):
+    """Where it would stand, and for whoever asked for the report; the others are there."""
+    for broken in (torn, Unsaved):
+        monkeypatch.setattr(plot, name, broken)
+        expected = f"report.html lacks what could not be drawn: {', '.join(lost)} (ValueError: no glyph); all numbers"
+        assert page.write(tmp_path, studied).startswith(expected)
+        read = Page((tmp_path / "report.html").read_text())
+        for picture in lost:
+            assert f"{picture} could not be drawn (ValueError: no glyph)." in read.text
+        assert len(read.links) == 13 - len(lost)
+        assert read.open == []
+
+
+@pytest.mark.parametrize(
+    ("broken", "sentence", "files"),
+    [
+        ("page._plot", r"report\.html lacks what could not be drawn: Measured .*, Corner plot of \S+ \(ValueError", 4),
+        (
+            "page.jinja2.Environment",
+            r"report\.html could not be made \(ValueError: no glyph\); .* saved in fit\.json",
+            3,
+        ),
+        ("page.files.write_text", r"report\.html could not be made \(ValueError: no glyph\); .* saved in fit\.json", 3),
+    ],
+    ids=["no Matplotlib", "no template", "no room for the page"],
+)
+def test_the_numbers_are_on_disk_before_anything_is_drawn(
+    studied, tmp_path, monkeypatch, blank, broken, sentence, files
+):
+    """The record and the draws are those of a report that is whole."""
+    (tmp_path / "whole").mkdir()
+    assert page.write(tmp_path / "whole", studied) == ""
+    numbers = {path.name: path.read_bytes() for path in (tmp_path / "whole").iterdir() if path.name != "report.html"}
+    assert sorted(numbers) == ["fit.json", *(f"posterior-{name}.parquet" for name in NAMES)]
+    monkeypatch.setattr(f"fitmat.reports.{broken}", torn)
+    with pytest.warns(UserWarning, match=sentence) as told:
+        page.report(studied, tmp_path / "made")
+    assert len(told) == 1
+    made = {path.name: path.read_bytes() for path in (tmp_path / "made").iterdir()}
+    assert len(made) == files
+    assert made | numbers == made
 
 
 def test_only_the_files_of_a_run_are_its_own(tmp_path):
