@@ -21,12 +21,17 @@ ABANDONED = 7 * 24 * 3600.0
 """Seconds after which such a folder, left by a killed run, is removed by a run of something else."""
 
 _LOCK, _DRAFT = "lock", "draft"
+_DEVICES = Path("/dev")
 _TRIES, _WAIT = 10, 0.02
 
 
 def default(source: Path) -> Path:
-    """`NAME-fitmat` beside the input, or the first `NAME-fitmat-2`, `-3`, … that neither exists nor is being made."""
-    return _free(source.parent / f"{source.stem}-fitmat")
+    """`NAME-fitmat` beside the input, or the first `NAME-fitmat-2`, `-3`, … that neither exists nor is being made.
+
+    Beside a device, as standard input is one, nothing is written, but in the working folder.
+    """
+    place = Path() if _DEVICES in source.parents else source.parent
+    return _free(place / f"{source.stem}-fitmat")
 
 
 def _free(first: Path) -> Path:

@@ -77,6 +77,7 @@ def test_a_default_name_that_is_being_made_is_not_free(tmp_path: Path) -> None:
     with files.new(first, own=own):
         assert files.default(tmp_path / "x.csv") == tmp_path / "x-fitmat-2"
     assert first == tmp_path / "x-fitmat"
+    assert files.default(Path("/dev/fd/63")) == Path("63-fitmat")  # a pipe: beside it is no place
 
 
 def test_what_a_killed_run_left_makes_way(tmp_path: Path, other: subprocess.Popen[str]) -> None:

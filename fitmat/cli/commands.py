@@ -7,7 +7,7 @@ from typing import Any
 
 import typer
 
-from fitmat.cli import process
+from fitmat.cli import interrupts, process
 from fitmat.cli.flags.cache import ClearFlag
 from fitmat.cli.flags.design import CountFlag, ForFlag, KindFlag
 from fitmat.cli.flags.files import (
@@ -131,7 +131,7 @@ def fit(
         told = {"loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
         target = out or files.default(file)
         with (
-            process.taken_away(files.new(target, own=page.own, force=force)) as draft,
+            interrupts.taken_away(files.new(target, own=page.own, force=force), files.abandon) as draft,
             programs.announced(watch.compiling),
         ):
             measurements = session.source(file, reading | {"instrument": instrument}, watch)
@@ -157,9 +157,9 @@ def fit(
     else:
         terminal.show(found, target / (page.PAGE if (target / page.PAGE).exists() else page.RECORD))
     if missing:
-        typer.echo(f"{target}: {missing}", err=True)
+        process.say(f"{target}: {missing}")
     if (kept := program_files.kept()).why:
-        typer.echo(kept.words, err=True)
+        process.say(kept.words)
     if any(p.fit.result != "converged" or p.interrupted for p in found.posteriors):
         raise typer.Exit(NOT_CONVERGED)
 

@@ -11,27 +11,36 @@ import sys
 # Matrices are small: the threads of BLAS cost more, from the import of NumPy on, than they save.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from fitmat.cli import process
-from fitmat.cli.commands import app
+from fitmat.cli import interrupts
 from fitmat.errors import FitmatError
 
 
 def main() -> None:
     """Run the command line; wrong input, a full disk and Ctrl-C become one line on stderr and an exit code."""
+    interrupts.leave_on_interrupt()
+    from fitmat.cli import process
+
     process.prepare_streams()
-    process.leave_on_interrupt()
+    from fitmat.cli.commands import app
+
     # A run is short and makes few reference cycles; looking for them, at the end above all, takes a fifth of its time.
     gc.disable()
     atexit.register(gc.freeze)
+    stdout, place = sys.stdout, os.fstat(1)
     try:
         try:
             app()
         finally:
             gc.enable()
             sys.stdout.flush()
+            # Where its reader has gone, Typer and Rich put something else in the place of stdout.
+            if sys.stdout is not stdout or not os.path.samestat(os.fstat(1), place):
+                raise BrokenPipeError
     except FitmatError as error:
         process.end(str(error))
+    except BrokenPipeError:
+        process.silence(1)
+        sys.exit(process.NOBODY_READS)
     except OSError as error:
-        # What could not be written must not be tried again when Python closes stdout.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        process.silence(1)
         process.end(f"cannot write the output: {error.strerror or error}.")

@@ -1,27 +1,22 @@
-"""The process behind a command: its streams, and how Ctrl-C ends it.
+"""The process behind a command: its streams, and the words with which it ends.
 
 It knows no command.
 """
 
-import contextlib
 import io
 import logging
 import os
-import signal
 import sys
 import warnings
-from collections.abc import Iterator
-from pathlib import Path
-from types import FrameType
+from typing import IO
 
-from fitmat import files
-
-WRONG_INPUT, INTERRUPTED = 1, 130
-"""Exit codes after wrong input, and after Ctrl-C."""
+WRONG_INPUT, NOBODY_READS = 1, 141
+"""Exit codes after wrong input, and where nobody reads the output to its end: 128 + SIGPIPE, as shells count."""
 
 
 def prepare_streams() -> None:
     """Keep stderr for what the user must act on, and never fail on a character that the terminal lacks."""
+    _open_what_is_closed()
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
     logging.disable(logging.WARNING)
@@ -30,36 +25,24 @@ def prepare_streams() -> None:
             stream.reconfigure(errors="replace")
 
 
-def leave_on_interrupt(draft: Path | None = None) -> None:
-    """Let Ctrl-C end the program at once, and its draft with it.
-
-    No exception: raised inside compiled code or while a module loads, it gets lost, turns into another, or crashes.
-    """
-
-    def leave(number: int, frame: FrameType | None) -> None:
-        if draft is not None:
-            files.abandon(draft)
-        sys.stderr.write("fitmat: interrupted before the end; no report was written.\n")
-        sys.stderr.flush()
-        os._exit(INTERRUPTED)
-
-    signal.signal(signal.SIGINT, leave)
+def _open_what_is_closed() -> None:
+    """Take the places of streams that are closed, before a file of the user's does: what is printed would go there."""
+    for place in range(3):
+        try:
+            os.fstat(place)
+        except OSError:  # the lowest free place is this one; stdout refuses what is written
+            os.open(os.devnull, os.O_WRONLY if place == 2 else os.O_RDONLY)
+    if sys.stdout is None:
+        sys.stdout = os.fdopen(1, "w", encoding="utf-8")
+    if sys.stderr is None:
+        sys.stderr = os.fdopen(2, "w", encoding="utf-8")
 
 
-@contextlib.contextmanager
-def taken_away(new: contextlib.AbstractContextManager[Path]) -> Iterator[Path]:
-    """A draft that Ctrl-C takes away, also where it comes while the draft is made."""
-    asked: list[int] = []
-    signal.signal(signal.SIGINT, lambda number, _: asked.append(number))
-    try:
-        with new as draft:
-            leave_on_interrupt(draft)
-            if asked:
-                signal.raise_signal(signal.SIGINT)
-            yield draft
-            signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is complete is moved into its place
-    finally:
-        leave_on_interrupt()
+def silence(place: int) -> None:
+    """Let what is still to be written to a stream, 1 or 2, go nowhere: it must not be tried again."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, place)
+    os.close(nowhere)
 
 
 def set_up() -> None:
@@ -69,7 +52,17 @@ def set_up() -> None:
     jax.config.update("jax_enable_x64", True)
 
 
+def say(words: str, stderr: IO[str] | None = None) -> None:
+    """Say something on stderr, if anybody reads it; else go on."""
+    stream = stderr or sys.stderr
+    try:
+        stream.write(f"{words}\n")
+        stream.flush()
+    except OSError:
+        silence(2)
+
+
 def end(message: str) -> None:
     """Say in one line what is wrong, and leave."""
-    sys.stderr.write(f"fitmat: {message}\n")
+    say(f"fitmat: {message}")
     sys.exit(WRONG_INPUT)

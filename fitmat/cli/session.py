@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from fitmat._types import SAMPLING
+from fitmat.cli import process
 
 if TYPE_CHECKING:
     from fitmat.measurements.large.stream import Stream
@@ -76,7 +77,10 @@ class Watch:
             self._give_back()
 
     def _say(self, words: str) -> None:
-        self._screen.print(words, highlight=False, markup=False, soft_wrap=True)
+        if self._bar is not None:
+            self._screen.print(words, highlight=False, markup=False, soft_wrap=True)
+        else:
+            process.say(words, self._screen.file)
 
     def _note(self, number: int, frame: FrameType | None) -> None:
         self._asked = True
@@ -119,9 +123,10 @@ def source(file: Path, reading: Mapping[str, Any], told: Watch) -> "Measurements
         ReadError: as `fitmat.read`.
     """
     from fitmat.measurements.large import chunks
+    from fitmat.measurements.parsing.contents import is_stream
     from fitmat.measurements.reader import read
 
-    if not chunks.is_large(file):
+    if is_stream(file) or not chunks.is_large(file):
         return read(file, **reading)
 
     def passing(step: str, done: int, total: int) -> None:

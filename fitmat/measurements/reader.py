@@ -80,7 +80,8 @@ def read(
     - Where known: sigma, or sigma_r …, in the unit of the quantity (and sigma_reference); valid, or flag.
 
     Args:
-        source: Path of a file, pandas or polars data frame, xarray object, or name → array of n numbers.
+        source: Path of a file or of a stream, such as a pipe; pandas or polars data frame, xarray object, or name →
+            array of n numbers.
         columns: Our name → name or number (from 1) in the file; or as text, "theta_i=Zenith,theta_o=3".
         quantity: What a column called value holds: "brdf", "brdf_cos", "reflectance_factor", "radiance" or
             "panel_ratio".
@@ -155,13 +156,20 @@ def measured(recording: Recording, options: Options) -> Measurements:
 def _recording(source: Source, columns: str | Mapping[str, str | int] | None, options: Options) -> Recording:
     if not isinstance(source, str | os.PathLike):
         return tabular.recording(_table(source), columns, options)
-    head, size = contents.contents(source, contents.HEAD), contents.size(source)
+    with contents.on_disk(source) as path:
+        return _of_file(path, columns, options)
+
+
+def _of_file(
+    path: str | os.PathLike[str], columns: str | Mapping[str, str | int] | None, options: Options
+) -> Recording:
+    head, size = contents.contents(path, contents.HEAD), contents.size(path)
     layout = next((layout for layout in FORMATS if layout.claims(head, size)), None)
     if layout is None:
-        table = parquet.load(source) if parquet.claims(head, size) else cells.load(source)
+        table = parquet.load(path) if parquet.claims(head, size) else cells.load(path)
         return tabular.recording(table, columns, options)
-    _refuse_needless(contents.name(source), layout.__name__.rpartition(".")[2], columns, options)
-    return layout.load(source)
+    _refuse_needless(contents.name(path), layout.__name__.rpartition(".")[2], columns, options)
+    return layout.load(path)
 
 
 def _refuse_needless(name: str, layout: str, columns: str | Mapping[str, str | int] | None, options: Options) -> None:

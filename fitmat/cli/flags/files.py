@@ -8,17 +8,26 @@ from typing import Annotated
 
 import typer
 
+STDIN = Path("/dev/stdin")
+
+
+def _source(file: Path) -> Path:
+    return STDIN if str(file) == "-" else file
+
+
 FileFlag = Annotated[
     Path,
     typer.Argument(
-        help="Measurements: CSV or any text table, Parquet, MERL, RGL, Zemax, LightTools, FRED, ASTM, UTIA, ALTA, SSDD."
+        help="Measurements: CSV or any text table, Parquet, MERL, RGL, Zemax, LightTools, FRED, ASTM, UTIA, ALTA, "
+        "SSDD; - for standard input.",
+        callback=_source,
     ),
 ]
 
 OutFlag = Annotated[
     Path | None,
     typer.Option(
-        help="Folder for the report; default NAME-fitmat (then -2, -3, …) beside the input.",
+        help="Folder for the report; default NAME-fitmat (then -2, -3, …) beside the input, of a stream where you are.",
         metavar="DIR",
         show_default=False,
     ),

@@ -4,15 +4,21 @@ It knows no format.
 """
 
 import codecs
+import contextlib
 import os
 import re
-from collections.abc import Iterable
+import stat
+import tempfile
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from fitmat.errors import ReadError
 
 HEAD = 65_536
 """Bytes by which a format is recognised."""
+
+STREAMED = 1 << 28
+"""Bytes that a stream may hold."""
 
 _BOMS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 _LEGACY = "cp1252"
@@ -38,6 +44,43 @@ def name(path: str | os.PathLike[str]) -> str:
 
 def _plain(text: str) -> str:
     return "".join(letter if letter.isprintable() else "�" for letter in text)
+
+
+def is_stream(path: str | os.PathLike[str]) -> bool:
+    """Whether a path can be read but once: a pipe, a FIFO, a terminal."""
+    try:
+        kind = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return False
+    return stat.S_ISFIFO(kind) or stat.S_ISCHR(kind) or stat.S_ISSOCK(kind)
+
+
+@contextlib.contextmanager
+def on_disk(path: str | os.PathLike[str]) -> Iterator[str | os.PathLike[str]]:
+    """A file that can be read again and again: the path itself, or what a stream gives, as a file of its name.
+
+    Raises:
+        ReadError: a stream cannot be read, is longer than `STREAMED`, or there is no room for it.
+    """
+    if not is_stream(path):
+        yield path
+        return
+    try:
+        with Path(path).open("rb") as file:
+            content = file.read(STREAMED + 1)
+    except OSError as error:
+        raise _unopened(path, error) from error
+    if len(content) > STREAMED:
+        got = f"a stream of more than {STREAMED >> 20} MB"
+        raise ReadError(f"{name(path)}: {got}, expected a file where there is so much. Save it first.")
+    with contextlib.ExitStack() as kept:
+        try:
+            copy = Path(kept.enter_context(tempfile.TemporaryDirectory(prefix="fitmat-"))) / Path(path).name
+            copy.write_bytes(content)
+        except OSError as error:
+            got = f"a stream that cannot be kept in {tempfile.gettempdir()} ({error.strerror})"
+            raise ReadError(f"{name(path)}: {got}, expected room for it. Save it as a file first.") from error
+        yield copy
 
 
 def size(path: str | os.PathLike[str]) -> int:
