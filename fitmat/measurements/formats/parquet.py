@@ -3,8 +3,12 @@
 It knows no column name (`columns` does) and rounds nothing.
 """
 
+import contextlib
 import io
 import os
+import tempfile
+import threading
+from collections.abc import Iterator
 
 import numpy as np
 import polars as pl
@@ -18,6 +22,7 @@ from fitmat.measurements.samples import Measurements
 MAGIC = b"PAR1"
 """The first and the last four bytes of a Parquet file."""
 
+_STDERR, _PANIC, _LOCK = 2, b"panicked at", threading.Lock()
 _PLAIN = (pl.Boolean, pl.Null, pl.String, pl.Categorical, pl.Enum, pl.Date, pl.Datetime, pl.Time)
 _SWELLING = 64
 _SMALL = 1 << 24
@@ -35,7 +40,7 @@ def load(path: str | os.PathLike[str]) -> Table:
         ReadError: the file is damaged, unpacks to far more than its size, or holds no rows.
     """
     source, raw = contents.name(path), contents.contents(path)
-    try:
+    with refused_if_damaged(source):
         lazy = pl.scan_parquet(io.BytesIO(raw))
         schema = lazy.collect_schema()
         flat = [name for name, kind in schema.items() if kind.is_numeric() or kind in _PLAIN]
@@ -45,10 +50,6 @@ def load(path: str | os.PathLike[str]) -> Table:
         cells = pl.DataFrame([_plain(column) for column in lazy.select(flat).collect()])
         text = cells.select(pl.col(pl.String).str.len_bytes().sum())
         _refuse_swelling(source, len(raw), sum(text.row(0)) if text.width else 0)
-    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, ValueError) as error:
-        reason = contents.shown(str(error).partition("\n")[0], 200)
-        expected = "expected a whole Parquet file. Was its download cut off?"
-        raise ReadError(f"{source}: its Parquet content cannot be read ({reason}), {expected}") from error
     if cells.is_empty():
         raise ReadError(
             f"{source}: no rows of plain cells, expected at least one measured value. Check how it was made."
@@ -56,6 +57,45 @@ def load(path: str | os.PathLike[str]) -> Table:
     left = [name for name in schema if name not in flat]
     notes = (f"Columns that hold no plain cells, not read: {contents.listed(left)}.",) if left else ()
     return Table(source, tuple(cells.columns), cells, np.arange(1, cells.height + 1), notes)
+
+
+@contextlib.contextmanager
+def refused_if_damaged(source: str) -> Iterator[None]:
+    """Make what polars comes upon in a damaged file one sentence; a panic of its threads is not printed.
+
+    Raises:
+        ReadError: polars cannot read the file.
+    """
+    try:
+        with _LOCK, _without_panics():
+            yield
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, ValueError) as error:
+        panic = isinstance(error, pl.exceptions.PanicException)
+        reason = "its parts contradict each other" if panic else contents.shown(str(error).partition("\n")[0], 200)
+        expected = "expected a whole Parquet file. Was its download cut off?"
+        raise ReadError(f"{source}: its Parquet content cannot be read ({reason}), {expected}") from error
+
+
+@contextlib.contextmanager
+def _without_panics() -> Iterator[None]:
+    """Hold back what compiled code prints on stderr, and print it afterwards unless a thread panicked."""
+    with contextlib.ExitStack() as held:
+        try:
+            printed = held.enter_context(tempfile.TemporaryFile())
+            before = os.dup(_STDERR)
+        except OSError:  # no room, or no stderr
+            yield
+            return
+        os.dup2(printed.fileno(), _STDERR)
+        try:
+            yield
+        finally:
+            os.dup2(before, _STDERR)
+            os.close(before)
+            printed.seek(0)
+            if _PANIC not in (said := printed.read()):
+                with contextlib.suppress(OSError):
+                    os.write(_STDERR, said)
 
 
 def dump(measurements: Measurements) -> bytes:

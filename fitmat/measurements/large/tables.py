@@ -6,8 +6,9 @@ It masks and converts nothing. Text that polars cannot take at once goes the way
 import codecs
 import dataclasses
 import itertools
+import mmap
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ import polars as pl
 
 from fitmat.errors import ReadError
 from fitmat.measurements.formats import parquet
-from fitmat.measurements.parsing import cells, contents
+from fitmat.measurements.parsing import cells, contents, footer
 from fitmat.measurements.parsing.table import Table
 
 TEXT_BLOCK = 2**23
@@ -47,20 +48,28 @@ def tables(path: str | os.PathLike[str], rows: int, words: str = "") -> Iterator
 
 def _parquet(path: str | os.PathLike[str], rows: int) -> Iterator[Table]:
     source = contents.name(path)
-    try:
+    with parquet.refused_if_damaged(source):
         lazy = pl.scan_parquet(Path(path), glob=False)
         plain = {name: kind for name, kind in lazy.collect_schema().items() if not _nested(kind)}
         lazy = lazy.select(pl.col(name).cast(_number_or_text(kind), strict=False) for name, kind in plain.items())
         count = lazy.select(pl.len()).collect().item()
-        if not count:
-            raise ReadError(f"{source}: no rows, expected at least one measured value. Check how it was made.")
-        for start in range(0, count, rows):
+        _refuse_contradictions(path, plain, count)
+    if not count:
+        raise ReadError(f"{source}: no rows, expected at least one measured value. Check how it was made.")
+    for start in range(0, count, rows):
+        with parquet.refused_if_damaged(source):
             cells = lazy.slice(start, rows).collect(engine="streaming")
-            yield Table(source, tuple(plain), cells, np.arange(start + 1, start + 1 + cells.height))
-    except (pl.exceptions.PolarsError, OSError) as error:
-        reason = str(error).partition("\n")[0]
-        got = f"its Parquet content cannot be read ({reason}), expected a whole Parquet file"
-        raise ReadError(f"{source}: {got}. Was its download cut off?") from error
+        yield Table(source, tuple(plain), cells, np.arange(start + 1, start + 1 + cells.height))
+
+
+def _refuse_contradictions(path: str | os.PathLike[str], names: Collection[str], rows: int) -> None:
+    """Stop where a page announces more than it can hold: polars would ask for as much memory, and end the process.
+
+    Raises:
+        ValueError: as `footer.unpacked`.
+    """
+    with Path(path).open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as raw:
+        footer.unpacked(raw, names, rows)
 
 
 def _nested(kind: pl.DataType) -> bool:

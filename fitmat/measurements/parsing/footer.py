@@ -8,6 +8,7 @@ uint32, and "PAR1"; each page is headed by a PageHeader that states its sizes.
 """
 
 from collections.abc import Collection, Iterator
+from mmap import mmap
 from typing import Any
 
 _DEEPEST = 16
@@ -17,11 +18,11 @@ _UNPACKED, _PACKED = 2, 3
 _ENCODINGS = 16
 
 
-def unpacked(raw: bytes, names: Collection[str], rows: int) -> int:
+def unpacked(raw: bytes | mmap, names: Collection[str], rows: int) -> int:
     """Bytes of all pages of the columns of these names, which hold plain cells.
 
     Args:
-        raw: All bytes of the file.
+        raw: All bytes of the file, or a map of it.
         names: Of the columns.
         rows: Of the file; no page may announce more values.
 
@@ -32,7 +33,7 @@ def unpacked(raw: bytes, names: Collection[str], rows: int) -> int:
     begin = end - int.from_bytes(raw[end : end + 4], "little")
     if begin < 0:
         raise ValueError("the footer is longer than the file")
-    groups = _Compact(raw[:end], begin).structure().get(_GROUPS, [])
+    groups = _Compact(raw[begin:end], 0).structure().get(_GROUPS, [])
     total = 0
     for count, size in enumerate(_pages(raw, groups, {name.encode() for name in names}, rows)):
         if count > len(raw):
@@ -41,12 +42,12 @@ def unpacked(raw: bytes, names: Collection[str], rows: int) -> int:
     return total
 
 
-def _pages(raw: bytes, groups: Any, names: set[bytes], rows: int) -> Iterator[int]:
+def _pages(raw: bytes | mmap, groups: Any, names: set[bytes], rows: int) -> Iterator[int]:
     """Unpacked size of each page."""
     for chunk in (chunk for group in _structures(groups) for chunk in _structures(group.get(_CHUNKS))):
         (about,) = _structures([chunk.get(_CHUNK)]) or [{}]
         path = about.get(_PATH)
-        if not isinstance(path, list) or not path or path[0] not in names:
+        if not isinstance(path, list) or not path or not isinstance(path[0], bytes) or path[0] not in names:
             continue
         starts = [_whole(about, key) for key in (_DATA, _DICTIONARY) if key in about]
         at = min(filter(None, starts), default=len(raw))
@@ -88,7 +89,7 @@ class _Compact:
         at: The next byte.
     """
 
-    def __init__(self, raw: bytes, at: int) -> None:
+    def __init__(self, raw: bytes | mmap, at: int) -> None:
         self._raw, self.at = raw, at
 
     def structure(self, depth: int = 0) -> dict[int, Any]:

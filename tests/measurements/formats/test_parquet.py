@@ -1,7 +1,10 @@
 """Parquet of others: cells of every plain kind, hostile files, and faults that become one plain sentence."""
 
 import io
+import os
 import struct
+from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import polars as pl
@@ -9,6 +12,8 @@ import pytest
 
 from fitmat.errors import ReadError
 from fitmat.measurements.formats import parquet
+from fitmat.measurements.large import tables
+from fitmat.measurements.parsing.footer import unpacked
 
 
 def pack(**columns: object) -> bytes:
@@ -104,3 +109,58 @@ def test_no_fault_of_parquet_raises_anything_but_a_read_error(tmp_path):
         except ReadError:
             outcomes["refused"] += 1
     assert min(outcomes.values()) > 10
+
+
+def damaged(step: int) -> Iterator[bytes]:
+    """A small file with one bit turned over, in every `step`-th byte between its magic numbers."""
+    memory = io.BytesIO()
+    table = {"theta_i": [30.0, 30.0, 30.0], "theta_o": [-30.0, 0.0, 30.0], "brdf": [1.0, None, 2.0]}
+    pl.DataFrame(table).write_parquet(memory, compression="uncompressed", statistics=False)
+    whole = memory.getvalue()
+    for place in range(4, len(whole) - 4, step):
+        for bit in (2, 8):
+            torn = bytearray(whole)
+            torn[place] ^= bit
+            yield bytes(torn)
+
+
+def in_memory(path: Path) -> None:
+    parquet.load(path)
+
+
+def block_by_block(path: Path) -> None:
+    list(tables.tables(path, 2))
+
+
+@pytest.mark.parametrize(("read", "step"), [(in_memory, 2), (block_by_block, 5)], ids=["in memory", "block by block"])
+def test_a_damaged_file_is_one_sentence(read, step, tmp_path, capfd):
+    """Where polars' threads panic, too: they print on the descriptor of stderr, which belongs to whoever called."""
+    path = tmp_path / "torn.parquet"
+    reasons = []
+    for content in damaged(step):
+        path.write_bytes(content)
+        try:
+            read(path)
+        except ReadError as error:
+            reasons.append(str(error))
+    assert len(reasons) > 50
+    assert all(reason.startswith("torn.parquet") and reason.count("\n") == 0 for reason in reasons)
+    assert not any(word in reason for reason in reasons for word in ("unwrap", "Panic", "assertion"))
+    assert read is block_by_block or any("its parts contradict each other" in reason for reason in reasons)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_what_is_no_panic_is_printed_afterwards(capfd):
+    with parquet.refused_if_damaged("x"):
+        os.write(2, b"a hint\n")
+        assert capfd.readouterr().err == ""
+    assert capfd.readouterr().err == "a hint\n"
+
+
+def test_a_name_that_is_a_list_is_no_column():
+    """Thrift by hand: groups {1: [chunks]}, a chunk {3: {3: path}}, and a path that begins with a list."""
+    path = b"\x39\x19\x09\x00"  # field 3, a list of one list of no lists; the end of the column's metadata
+    chunk = b"\x3c" + path + b"\x00"  # field 3, a structure; the end of the chunk
+    footer = b"\x49\x1c" + b"\x19\x1c" + chunk + b"\x00" + b"\x00"  # field 4, a list of one group, field 1 its chunks
+    raw = b"PAR1" + footer + len(footer).to_bytes(4, "little") + b"PAR1"
+    assert unpacked(raw, ["brdf"], 3) == 0
