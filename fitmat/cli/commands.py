@@ -250,6 +250,7 @@ def convert(
     force: ReplaceFlag = False,
 ) -> None:
     """Write measurements in another format; what that cannot hold is said."""
+    process.refuse_little_memory()
     from fitmat.measurements import writing
     from fitmat.measurements.reader import read
 

@@ -38,6 +38,8 @@ def main() -> None:
                 raise BrokenPipeError
     except FitmatError as error:
         process.end(str(error))
+    except MemoryError:
+        process.end("there is not enough memory; take fewer models or rows at once, or a machine with more.")
     except BrokenPipeError:
         process.silence(1)
         sys.exit(process.NOBODY_READS)

@@ -10,8 +10,14 @@ import sys
 import warnings
 from typing import IO
 
+from fitmat.errors import FitmatError
+
 WRONG_INPUT, NOBODY_READS = 1, 141
 """Exit codes after wrong input, and where nobody reads the output to its end: 128 + SIGPIPE, as shells count."""
+
+
+ADDRESSES = 2_000_000_000
+"""Bytes of address space that polars, XLA and their threads take for a small file; with less they hang or abort."""
 
 
 def prepare_streams() -> None:
@@ -45,8 +51,25 @@ def silence(place: int) -> None:
     os.close(nowhere)
 
 
+def refuse_little_memory() -> None:
+    """Stop where compiled libraries would be refused memory, which ends the process or hangs it without a word.
+
+    Raises:
+        FitmatError: the process may use less address space than they take.
+    """
+    try:
+        import resource  # not on every system
+    except ImportError:
+        return
+    granted = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if granted != resource.RLIM_INFINITY and granted < ADDRESSES:
+        got = f"this process may use {granted / 1e9:.2g} GB of address space"
+        raise FitmatError(f"{got}, expected at least {ADDRESSES / 1e9:g} GB. Raise the limit with ulimit -v unlimited.")
+
+
 def set_up() -> None:
-    """Turn on 64-bit floats."""
+    """Turn on 64-bit floats, where there is memory for it."""
+    refuse_little_memory()
     import jax
 
     jax.config.update("jax_enable_x64", True)

@@ -117,3 +117,28 @@ def test_standard_input_is_read(run: Run, tmp_path: Path, monkeypatch: pytest.Mo
     finally:
         os.dup2(before, 0)
         os.close(before)
+
+
+@pytest.mark.parametrize("command", ["check", "convert", "fit"])
+def test_little_memory_is_said_before_anything_is_loaded(command: str, tmp_path: Path) -> None:
+    """600 MB of address space: compiled libraries abort there."""
+    words = ["sh", "-c", 'ulimit -v 600000; exec "$@"', "sh", sys.executable, "-m", "fitmat", command, "x.csv"]
+    made = [str(tmp_path / "x.parquet")] if command == "convert" else []
+    ended = subprocess.run([*words, *made], capture_output=True, text=True, timeout=PATIENCE)
+    assert (ended.returncode, ended.stdout) == (1, "")
+    assert ended.stderr == (
+        "fitmat: this process may use 0.61 GB of address space, expected at least 2 GB. "
+        "Raise the limit with ulimit -v unlimited.\n"
+    )
+
+
+def test_memory_that_ends_is_said(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def nothing_left(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("fitmat.cli.manual.list_losses", nothing_left)
+    ended = run("losses")
+    assert (ended.code, ended.out) == (1, "")
+    assert ended.err == (
+        "fitmat: there is not enough memory; take fewer models or rows at once, or a machine with more.\n"
+    )
