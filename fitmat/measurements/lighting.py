@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike
 
 from fitmat.errors import ReadError
 
+LARGEST = 1e30
+"""Intensities and distances beyond, in any unit, are a slip of the keyboard; their squares leave the floats' range."""
+
 
 @dataclasses.dataclass(frozen=True)
 class PointSource:
@@ -21,7 +24,7 @@ class PointSource:
         distance: d from the sample in m, > 0; at ten times the source's size the inverse square is off by 0.25 %.
 
     Raises:
-        ReadError: a number is not positive and finite.
+        ReadError: a number is not positive, or beyond `LARGEST`, or its inverse is.
     """
 
     intensity: float
@@ -30,8 +33,9 @@ class PointSource:
     def __post_init__(self) -> None:
         for name in ("intensity", "distance"):
             value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise ReadError(f"{name} = {value:g} (--{name}), expected a positive number. Correct it.")
+            if not 1 / LARGEST <= value <= LARGEST:
+                expected = f"expected a positive number, at most {LARGEST:g}"
+                raise ReadError(f"{name} = {value:g} (--{name}), {expected}. Correct it.")
 
     def irradiance(self, theta_i: ArrayLike) -> Float[np.ndarray, "..."]:
         """E = I cosθ_i/d² on the sample in W/m² (inverse square and cosine law, Lambert 1760); theta_i in radians."""

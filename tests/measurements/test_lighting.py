@@ -35,7 +35,10 @@ def test_radiances_in_a_table_become_brdf_with_their_sigma() -> None:
     assert "I = 50 W/sr at d = 0.5 m" in " ".join(m.notes)
 
 
-@pytest.mark.parametrize(("intensity", "distance"), [(0.0, 1.0), (-1.0, 1.0), (np.nan, 1.0), (1.0, 0.0), (1.0, np.inf)])
+@pytest.mark.parametrize(
+    ("intensity", "distance"),
+    [(0.0, 1.0), (-1.0, 1.0), (np.nan, 1.0), (1.0, 0.0), (1.0, np.inf), (1.0, 1e200), (1e200, 1.0), (1.0, 1e-200)],
+)
 def test_sources_that_cannot_be(intensity: float, distance: float) -> None:
     with pytest.raises(ReadError, match=r"(intensity|distance) = .*, expected a positive number"):
         PointSource(intensity, distance)
