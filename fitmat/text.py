@@ -24,6 +24,25 @@ LARGE = 1e6
 """Numbers from here on are written with a power of ten."""
 
 
+def visible(text: str, keep: str = "") -> str:
+    r"""Text without what a terminal or a page would obey: escape sequences, control characters, marks of direction.
+
+    Args:
+        text: What a user, a file or a folder may have named.
+        keep: Characters that stay as they are, as the line ends of text that is ours.
+
+    Returns:
+        The text, each character that cannot be printed as Python writes it.
+
+    Example:
+        >>> print(visible("\x1b[31mred"))
+        \x1b[31mred
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in keep else ascii(c)[1:-1] for c in text)
+
+
 def with_error(value: float, sd: float) -> str:
     """A value to the precision of its standard deviation: `0.1503 ± 0.0010`; four digits where there is none."""
     if not math.isfinite(value):

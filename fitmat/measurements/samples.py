@@ -15,7 +15,7 @@ from fitmat import arguments
 from fitmat.errors import ReadError
 from fitmat.maths.directions import from_angles, relative_azimuth, signed_azimuth, signed_zenith, zenith
 from fitmat.measurements.instrument import IDEAL, Instrument
-from fitmat.text import brief
+from fitmat.text import brief, visible
 
 IN_PLANE = np.deg2rad(0.5)
 """A sample whose azimuth is within this angle of the plane of incidence counts as in-plane."""
@@ -247,7 +247,8 @@ def _names(source: str, given: Sequence[str] | None, count: int) -> tuple[str, .
     for name in given:
         arguments.kind("a name in channels", name, str)
     if len(given) != count or len(set(given)) != count:
-        raise ReadError(f"{source}: channels {', '.join(given)}, expected {count} different names.")
+        got = f"channels {', '.join(map(visible, given))} for {count} columns of values"
+        raise ReadError(f"{source}: {got}, expected one name each, all different. Name them (channels=).")
     return tuple(given)
 
 

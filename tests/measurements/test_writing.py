@@ -1,24 +1,29 @@
 """Writing: what is written is read back, by fitmat and by others, and no file of the user's is lost on the way."""
 
+import contextlib
 import csv
+import dataclasses
 import errno
 import os
 import sys
 import types
+import warnings
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
-from fitmat.errors import OutputError
+from fitmat.errors import OutputError, ReadError
 from fitmat.files import write_bytes, write_text
 from fitmat.measurements import options, writing
 from fitmat.measurements.formats import parquet
 from fitmat.measurements.parsing import tabular
 from fitmat.measurements.reader import measured as finished
 from fitmat.measurements.reader import read
-from fitmat.measurements.samples import Measurements, from_arrays
+from fitmat.measurements.samples import Measurements, default_channels, from_arrays
 from fitmat.measurements.writing import write
 
 SEVEN_DIGITS = 5.1e-7
@@ -101,6 +106,103 @@ def test_parquet_and_csv_hold_the_same_columns(tmp_path):
 
 
 VALUES = ("brdf_r", "brdf_g", "brdf_b", "sigma_r", "sigma_g", "sigma_b")
+
+
+NASTY = (
+    "VIS", "R", "sigma_r", "theta_i", "brdf", "channel", "cos", "value", "550nm", "a,b", "a;b", "a\tb", 'a"b', '"',
+    '""', '" , "', "a , b", "# a", "#N/A", "NA", "%", "//", "a b", " a", "a ", " ", "", "θ, °", "日本", "1", "1,5",
+    "10,691", "-999", "1e3", "sep=;", "[red]", "a\nb", "a\rb", "a\0", "\x1b[31m", "\u202e", "\ufeff", "\ud800",
+)  # fmt: skip
+
+
+def named(*channels: str, sigma: float | None = 0.1) -> Measurements:
+    """Two rows of each channel, no value like another."""
+    value = 1.0 + np.arange(2.0 * len(channels)).reshape(2, -1)
+    return dataclasses.replace(from_arrays([0.1, 0.2], [0.3, 0.4], value, sigma=sigma), channels=channels)
+
+
+@settings(deadline=None, derandomize=True, max_examples=120)
+@given(
+    channels=st.lists(st.sampled_from(NASTY) | st.text(max_size=6), min_size=1, max_size=4),
+    suffix=st.sampled_from([".csv", ".parquet", ".alta"]),
+    sigma=st.sampled_from([None, 0.1]),
+)
+@example(channels=["VIS", "NIR"], suffix=".parquet", sigma=None)
+@example(channels=["r", "sigma_r"], suffix=".csv", sigma=0.1)
+@example(channels=["r", "r"], suffix=".csv", sigma=None)
+@example(channels=["a , b"], suffix=".csv", sigma=None)
+def test_a_channels_name_comes_back_or_is_refused(tmp_path_factory, channels, suffix, sigma):
+    there = named(*channels, sigma=sigma)
+    path = tmp_path_factory.mktemp("names") / f"table{suffix}"
+    with warnings.catch_warnings(), contextlib.suppress(OutputError):
+        warnings.simplefilter("ignore")
+        write(there, path)
+    if not path.exists():
+        return
+    back = read(path, angle_unit="degrees") if suffix != ".alta" else read(path)
+    assert back.value.tolist() == there.value.tolist()
+    lost = any("Names of channels not written" in words for words in writing.losses(there, path))
+    assert back.channels == (default_channels(len(channels)) if lost else tuple(channels))
+    if sigma is not None and suffix != ".alta":
+        assert back.sigma == pytest.approx(np.full(there.value.shape, sigma), rel=1e-15)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+@pytest.mark.parametrize("name", ["VIS", "R", "sigma_r", "a,b", 'a"b', "a , b", "550nm", "θ, °", "# a", "a\tb", "NA"])
+def test_usual_names_of_channels_are_held(tmp_path, suffix, name):
+    back = read(write(named("g", name), tmp_path / f"table{suffix}"), angle_unit="degrees")
+    assert back.channels == ("g", name)
+    assert back.value.tolist() == [[1.0, 2.0], [3.0, 4.0]]
+
+
+@pytest.mark.parametrize(
+    ("suffix", "names", "sentence"),
+    [
+        (
+            ".csv",
+            ("a\nb", "c"),
+            r"array: 'a\\nb' is a channel's name that would not be read back from such a file, exp",
+        ),
+        (".csv", ("10,691", "c"), "'10,691' is a channel's name that would not"),
+        (".csv", ("r", "r"), "'r' is the name of two channels, expected .*, each once. Rename the channel."),
+        (".parquet", ("a ", "c"), "'a ' is a channel's name that would not"),
+        (".parquet", ("", "c"), "'' is a channel's name that would not"),
+        (".parquet", ("\ud800", "c"), r"'\\ud800' is a channel's name that would not"),
+    ],
+)
+def test_a_name_that_would_be_lost_is_refused(tmp_path, suffix, names, sentence):
+    with pytest.raises(OutputError, match=sentence):
+        write(named(*names), tmp_path / f"table{suffix}")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_line_for_each_channel_is_what_others_read(tmp_path):
+    """Reader: Python's csv module."""
+    with write(named("VIS", 'a,"b"'), tmp_path / "table.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["channel"], float(row["brdf"])) for row in rows] == [
+        ("VIS", 1.0),
+        ('a,"b"', 2.0),
+        ("VIS", 3.0),
+        ('a,"b"', 4.0),
+    ]
+
+
+def test_the_name_of_one_channel_comes_back(tmp_path):
+    assert read(write(named("550", sigma=None), tmp_path / "a.csv"), angle_unit="degrees").channels == ("550",)
+
+
+@pytest.mark.parametrize("channels", [("r", "r"), ("r",), ("r", "g", "b")])
+def test_each_channel_has_a_name_of_its_own(channels):
+    with pytest.raises(ReadError, match=r"channels r.* for 2 columns of values, expected one name each, all diff"):
+        from_arrays([0.1], [0.2], [[1.0, 2.0]], channels=channels)
+
+
+def test_what_a_source_is_called_breaks_no_file(tmp_path):
+    there = dataclasses.replace(named("value"), source="a\n#DIM 9 9\x1b[31m")
+    with pytest.warns(UserWarning, match="sigma not written"):
+        path = write(there, tmp_path / "a.alta")
+    assert read(path).n_samples == 2
 
 
 # --- files of the user ----------------------------------------------------------------------------

@@ -21,6 +21,7 @@ from fitmat.maths.directions import from_angles, zenith
 from fitmat.measurements.parsing import blocks, contents
 from fitmat.measurements.parsing.recording import Recording
 from fitmat.measurements.samples import Measurements, default_channels
+from fitmat.text import visible
 
 Directions = Float[np.ndarray, "n 3"]
 Pair = tuple[Directions, Directions]
@@ -97,7 +98,7 @@ def dump(measurements: Measurements) -> str:
         got = "no sample that is valid in all channels, expected at least one"
         raise OutputError(f"{measurements.source}: {got}. Check what is masked.")
     output = {channels: name for name, channels in _CHANNELS.items()}.get(kept.channels, "INV_STERADIAN")
-    head = [f"# {' '.join(kept.source.split())}, written by fitmat", f"#DIM 4 {len(kept.channels)}"]
+    head = [f"# {visible(kept.source)}, written by fitmat", f"#DIM 4 {len(kept.channels)}"]
     head += [f"#PARAM_IN  {_WRITTEN}", f"#PARAM_OUT {output}"]
     if _nameable(kept.channels):
         head.append(f"#CHANNELS {' '.join(kept.channels)}")
@@ -121,11 +122,13 @@ def _losses(measurements: Measurements) -> Iterator[str]:
     if measurements.sigma is not None:
         yield "sigma not written: the bounds of an ALTA file are no standard deviations."
     if not _nameable(measurements.channels):
-        yield "Names of channels not written: they hold white space."
+        yield "Names of channels not written: they are empty, hold white space or control characters, or are alike."
 
 
 def _nameable(channels: tuple[str, ...]) -> bool:
-    return all(name == "".join(name.split()) for name in channels)
+    """Whether the names are distinct words that text can hold."""
+    words = all(name and name.isprintable() and " " not in name for name in channels)
+    return words and len(set(channels)) == len(channels)
 
 
 def _layout(header: Mapping[str, str], source: str) -> tuple[int, int, str, str]:

@@ -21,7 +21,8 @@ from jaxtyping import Bool, Float, Int
 from fitmat.errors import OutputError, ReadError
 from fitmat.measurements.parsing import contents
 from fitmat.measurements.parsing.recording import Recording
-from fitmat.measurements.samples import Measurements
+from fitmat.measurements.samples import Measurements, default_channels
+from fitmat.text import visible
 
 SHAPE = (90, 90, 180)
 """Cells in θ_h, θ_d and φ_d of the database's files, and of those that are written."""
@@ -204,5 +205,8 @@ def _losses(measurements: Measurements, grid: _Grid) -> Iterator[str]:
         yield f"{negative} MERL cells of negative value written as invalid."
     if len(measurements.channels) == 1:
         yield "One channel written to all three planes of the MERL file."
+    if measurements.channels not in (CHANNELS, default_channels(1)):
+        named = ", ".join(map(visible, measurements.channels))
+        yield f"Names of channels, {named}, not written: the planes of a MERL file are r, g, b."
     if measurements.sigma is not None:
         yield "sigma not written: a MERL file has no place for it."

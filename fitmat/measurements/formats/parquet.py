@@ -99,10 +99,26 @@ def _without_panics() -> Iterator[None]:
 
 
 def dump(measurements: Measurements) -> bytes:
-    """The columns of `csv.columns` in full float64: what is read back is what was written."""
+    """The columns of `csv.columns` in full float64: what is read back is what was written.
+
+    Raises:
+        OutputError: a channel's name would not be read back.
+    """
+    columns = csv.columns(measurements)
+    if csv.CHANNEL in columns:
+        csv.refuse_lost(measurements, [_read_back(name) for name in measurements.channels])
     buffer = io.BytesIO()
-    pl.DataFrame(csv.columns(measurements)).write_parquet(buffer)
+    pl.DataFrame(columns).write_parquet(buffer)
     return buffer.getvalue()
+
+
+def _read_back(name: str) -> str | None:
+    """What is read of a channel's name where it is a cell."""
+    try:
+        cells = pl.DataFrame({csv.CHANNEL: [name]})
+    except UnicodeEncodeError:
+        return None
+    return str(Table("", (csv.CHANNEL,), cells, np.ones(1, int)).words(0)[0])
 
 
 def _refuse_swelling(source: str, size: int, unpacked: int) -> None:

@@ -76,7 +76,7 @@ def parse(text: str, source: str, notes: tuple[str, ...], above: int = 0) -> Tab
 
 def _delimiter(lines: list[str]) -> str | None:
     """Tab, semicolon or comma, whichever at least half of the lines hold; None stands for white space."""
-    lines = [line.strip() for line in lines if not re.match(_SEMICOLON, line)]
+    lines = [re.sub(_QUOTED, "", line).strip() for line in lines if not re.match(_SEMICOLON, line)]
     decimal_commas = not lines or _SPACED.search(lines[0]) or "," not in lines[0]
     for mark in "\t;" if decimal_commas else "\t;,":
         if 0 < len(lines) <= 2 * sum(mark in line for line in lines):
@@ -89,7 +89,7 @@ def _tidy(lines: pl.Series, delimiter: str | None) -> pl.Series:
     if delimiter is None:
         return lines.str.strip_chars().str.replace_all(r"\s+", "\t")
     if lines.str.contains('"', literal=True).any():
-        return lines.str.strip_chars(" ").str.replace_all(f" *{delimiter} *", delimiter)
+        return lines.str.replace_all(rf'(^|{delimiter}) *("(?:[^"]|"")*") *', "${1}${2}")
     return lines
 
 
