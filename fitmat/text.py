@@ -4,7 +4,10 @@ Knows no result.
 """
 
 import dataclasses
+import json
 import math
+import os
+import shlex
 from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
@@ -32,15 +35,19 @@ def visible(text: str, keep: str = "") -> str:
         keep: Characters that stay as they are, as the line ends of text that is ours.
 
     Returns:
-        The text, each character that cannot be printed as Python writes it.
+        The text, each character that cannot be printed as JSON writes it, so that JSON stays what it is.
 
     Example:
         >>> print(visible("\x1b[31mred"))
-        \x1b[31mred
+        \u001b[31mred
     """
-    if text.isprintable():
-        return text
-    return "".join(c if c.isprintable() or c in keep else ascii(c)[1:-1] for c in text)
+    odd = () if text.isprintable() else (c for c in set(text) if not c.isprintable() and c not in keep)
+    return text.translate({ord(c): "\\u007f" if c == "\x7f" else json.dumps(c)[1:-1] for c in odd})
+
+
+def for_shell(path: str | os.PathLike[str]) -> str:
+    """A path as a command line takes it, quoted where it must be."""
+    return visible(shlex.quote(os.fspath(path)))
 
 
 def with_error(value: float, sd: float) -> str:
@@ -85,6 +92,8 @@ def text_table(caption: str, rows: Sequence[Sequence[str]]) -> str:
 
 def plain(thing: Any) -> Any:
     """JSON types only: arrays to lists, NaN and infinity to None."""
+    import numpy as np  # the command line's start does without it
+
     if isinstance(thing, dict):
         return {key: plain(value) for key, value in thing.items()}
     if isinstance(thing, list | tuple):

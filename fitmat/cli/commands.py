@@ -1,6 +1,5 @@
 """The command line: parse, one library call, print. The only room that speaks."""
 
-import sys
 import warnings
 from pathlib import Path
 from typing import Any
@@ -53,6 +52,7 @@ from fitmat.cli.flags.simulate import (
     ThetaOFlag,
 )
 from fitmat.cli.flags.version import VersionFlag
+from fitmat.text import for_shell, visible
 
 DEFAULT_MODELS = "lambert+blinn-phong,lambert+ggx"
 NOT_CONVERGED = 3
@@ -153,13 +153,13 @@ def fit(
     if not no_mcmc:
         forget(files.resumed(target))
     if json_:
-        sys.stdout.write((target / "fit.json").read_text(encoding="utf-8"))
+        process.say((target / "fit.json").read_text(encoding="utf-8").rstrip("\n"))
     else:
         terminal.show(found, target / (page.PAGE if (target / page.PAGE).exists() else page.RECORD))
     if missing:
-        process.say(f"{target}: {missing}")
+        process.say(f"{target}: {missing}", err=True)
     if (kept := program_files.kept()).why:
-        process.say(kept.words)
+        process.say(kept.words, err=True)
     if any(p.fit.result != "converged" or p.interrupted for p in found.posteriors):
         raise typer.Exit(NOT_CONVERGED)
 
@@ -204,7 +204,7 @@ def simulate(
         written = simulate.write_simulation(
             out, truth, angles, noise=(noise, floor, seed), instrument=instrument, force=force
         )
-    typer.echo("\n".join(str(path) for path in written))
+    process.say("\n".join(visible(str(path)) for path in written))
 
 
 @app.command(
@@ -229,11 +229,11 @@ def check(
 
     refuse_picture(plot, force=force)
     found = examine(read(file, **reading, instrument=instrument))
-    typer.echo(check.as_json(found) if json_ else str(found))
+    process.say(check.as_json(found) if json_ else str(found))
     if plot is not None:
         check.draw(found, plot)
     elif not json_:
-        typer.echo(f"See what was measured where: fitmat check {file} --plot coverage.png")
+        process.say(f"See what was measured where: fitmat check {for_shell(file)} --plot coverage.png")
 
 
 @app.command(
@@ -258,7 +258,7 @@ def convert(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         writing.write(measurements, out, force=force)
-    typer.echo("\n".join([str(measurements), *writing.losses(measurements, out), str(out)]))
+    process.say("\n".join([str(measurements), *writing.losses(measurements, out), visible(str(out))]))
 
 
 @app.command(cls=Command)
@@ -319,7 +319,7 @@ def design(
             posteriors = fit_each(measurements, jobs, seed=seed, progress=watch)
             watch("looking for the next angles", 0, 0)
             found = design.propose(posteriors, for_, kind=kind, count=count)
-    typer.echo(design.as_json(found) if json_ else design.as_text(found))
+    process.say(design.as_json(found) if json_ else design.as_text(found))
     if plot is not None:
         design.draw(found, plot)
 
@@ -342,6 +342,6 @@ def cache(
     found = program_files.kept()
     if clear and found.folder is not None:
         program_files.remove()
-        typer.echo(f"{found.amount}, were removed from the folder {found.folder}.")
+        process.say(f"{found.amount}, were removed from the folder {found.folder}.")
     else:
-        typer.echo(found.words)
+        process.say(found.words)

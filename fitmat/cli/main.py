@@ -18,6 +18,8 @@ from fitmat.errors import FitmatError
 def main() -> None:
     """Run the command line; wrong input, a full disk and Ctrl-C become one line on stderr and an exit code."""
     interrupts.leave_on_interrupt()
+    import typer
+
     from fitmat.cli import process
 
     process.prepare_streams()
@@ -29,13 +31,15 @@ def main() -> None:
     stdout, place = sys.stdout, os.fstat(1)
     try:
         try:
-            app()
+            ended = app(standalone_mode=False)
         finally:
             gc.enable()
             sys.stdout.flush()
             # Where its reader has gone, Typer and Rich put something else in the place of stdout.
             if sys.stdout is not stdout or not os.path.samestat(os.fstat(1), place):
                 raise BrokenPipeError
+    except typer.BadParameter.__bases__ as error:
+        process.misused(error)
     except FitmatError as error:
         process.end(str(error))
     except MemoryError:
@@ -46,3 +50,4 @@ def main() -> None:
     except OSError as error:
         process.silence(1)
         process.end(f"cannot write the output: {error.strerror or error}.")
+    sys.exit(ended)

@@ -8,9 +8,12 @@ import logging
 import os
 import sys
 import warnings
-from typing import IO
+from typing import IO, Any, NoReturn
+
+import typer
 
 from fitmat.errors import FitmatError
+from fitmat.text import visible
 
 WRONG_INPUT, NOBODY_READS = 1, 141
 """Exit codes after wrong input, and where nobody reads the output to its end: 128 + SIGPIPE, as shells count."""
@@ -67,6 +70,28 @@ def refuse_little_memory() -> None:
         raise FitmatError(f"{got}, expected at least {ADDRESSES / 1e9:g} GB. Raise the limit with ulimit -v unlimited.")
 
 
+def say(words: str, *, err: bool = False) -> None:
+    """Print words, of which none can make the terminal do anything but begin a new line.
+
+    Args:
+        words: What is said.
+        err: Whether on stderr, where a reader that has gone stops nothing.
+    """
+    if err:
+        tell(words, sys.stderr)
+    else:
+        typer.echo(visible(words, keep="\n"))
+
+
+def tell(words: str, stderr: IO[str]) -> None:
+    """Say something on stderr, if anybody reads it; else go on."""
+    try:
+        stderr.write(f"{visible(words, keep=chr(10))}\n")
+        stderr.flush()
+    except OSError:
+        silence(2)
+
+
 def set_up() -> None:
     """Turn on 64-bit floats, where there is memory for it."""
     refuse_little_memory()
@@ -75,17 +100,17 @@ def set_up() -> None:
     jax.config.update("jax_enable_x64", True)
 
 
-def say(words: str, stderr: IO[str] | None = None) -> None:
-    """Say something on stderr, if anybody reads it; else go on."""
-    stream = stderr or sys.stderr
-    try:
-        stream.write(f"{words}\n")
-        stream.flush()
-    except OSError:
-        silence(2)
+def misused(error: Any) -> NoReturn:
+    """Say what is wrong with the arguments, as typer does, and leave."""
+    from typer import rich_utils
+
+    words = visible(error.format_message(), keep="\n")
+    error.format_message = lambda: words
+    rich_utils.rich_format_error(error)
+    sys.exit(error.exit_code)
 
 
-def end(message: str) -> None:
+def end(message: str) -> NoReturn:
     """Say in one line what is wrong, and leave."""
-    say(f"fitmat: {message}")
+    say(f"fitmat: {visible(message)}", err=True)
     sys.exit(WRONG_INPUT)

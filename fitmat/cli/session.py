@@ -16,6 +16,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn
 
 from fitmat._types import SAMPLING
 from fitmat.cli import process
+from fitmat.text import visible
 
 if TYPE_CHECKING:
     from fitmat.measurements.large.stream import Stream
@@ -39,13 +40,19 @@ class Watch:
     def open(self, what: str) -> None:
         """Show that something is going on, at a terminal only, before there is a stage."""
         if self._screen.is_terminal and not self._screen.is_dumb_terminal:
-            parts = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(20), TimeElapsedColumn())
+            parts = (
+                SpinnerColumn(),
+                TextColumn("{task.description}", markup=False),
+                BarColumn(20),
+                TimeElapsedColumn(),
+            )
             self._bar = Progress(*parts, TimeRemainingColumn(), console=self._screen, transient=True)
             self._bar.start()
             self._task = self._bar.add_task(what, total=None)
 
     def __call__(self, what: str, done: int, total: int) -> None:
         """Show the stage; stop where that was asked for."""
+        what = visible(what)
         sampling = what.startswith(SAMPLING)
         if what != self._stage:
             self._begin(what, sampling)
@@ -78,9 +85,9 @@ class Watch:
 
     def _say(self, words: str) -> None:
         if self._bar is not None:
-            self._screen.print(words, highlight=False, markup=False, soft_wrap=True)
+            self._screen.print(visible(words), highlight=False, markup=False, soft_wrap=True)
         else:
-            process.say(words, self._screen.file)
+            process.tell(words, self._screen.file)
 
     def _note(self, number: int, frame: FrameType | None) -> None:
         self._asked = True

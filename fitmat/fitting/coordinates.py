@@ -16,6 +16,7 @@ from jaxtyping import Array, Float
 
 from fitmat.maths.arrays import library
 from fitmat.models.parameters import Entry, entries, with_vector
+from fitmat.text import visible
 
 M = TypeVar("M", bound=eqx.Module)
 Numbers = TypeVar("Numbers", np.ndarray, Array)
@@ -173,7 +174,7 @@ def coordinates(
 
 
 def channel_names(entry: Entry, channels: tuple[str, ...]) -> list[str]:
-    """The name of each value of a parameter: "kd r", "kd g", or "alpha" where it is shared or there is one channel."""
+    """The name of each value of a parameter, on one line: "kd r", "kd g", or "alpha" where all channels share it."""
     if not entry.shape or len(channels) < 2:
         return [entry.name] * entry.size
-    return [f"{entry.name} {channel}" for channel in channels]
+    return [f"{entry.name} {visible(channel)}" for channel in channels]

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from fitmat.measurements.neighbours import leave_one_out
 from fitmat.measurements.samples import Measurements
-from fitmat.text import brief
+from fitmat.text import brief, visible
 
 MIN_RESIDUALS = 12
 """Fewer neighbour comparisons than this say nothing about the noise."""
@@ -128,7 +128,7 @@ def law_words(laws: Float[np.ndarray, "c 2"], channels: tuple[str, ...]) -> str:
     """The laws of all channels in one sentence."""
     if not np.isfinite(laws).all():
         return UNKNOWN
-    named = [f" ({channel})" if len(channels) > 1 else "" for channel in channels]
+    named = [f" ({visible(channel)})" if len(channels) > 1 else "" for channel in channels]
     parts = (f"{100 * b:.2g} % + {a:.2g} sr⁻¹{name}" for (a, b), name in zip(laws, named, strict=True))
     return f"Noise estimated from neighbouring angles: {'; '.join(parts)}."
 

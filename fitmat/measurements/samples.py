@@ -146,7 +146,7 @@ class Measurements:
         names = self.channels if len(self.channels) <= 12 else (*self.channels[:3], "…", self.channels[-1])
         count = "" if len(names) == len(self.channels) else f" ({len(self.channels)})"
         lines = [
-            f"{self.source}: {self.n_samples} samples, channels {', '.join(names)}{count}",
+            f"{self.source}: {self.n_samples} samples, channels {', '.join(map(visible, names))}{count}",
             f"incidence {listed}; sigma {'given' if self.sigma is not None else 'not given'}",
         ]
         lines += [f"{count} masked: {reason}" for reason, count in self.masked.items()]

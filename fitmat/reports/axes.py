@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fitmat import arguments
+from fitmat.text import visible
 
 # Okabe & Ito's palette, safe for colour-blind readers.
 BLACK, ORANGE, BLUE, GREEN, PURPLE = "#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7"
@@ -16,8 +17,8 @@ FIT_COLOURS = (ORANGE, BLUE, GREEN, PURPLE)
 
 
 def plain(text: str) -> str:
-    """A text in which Matplotlib finds no formula, for names that users choose."""
-    return text.replace("$", r"\$")
+    """A text in which Matplotlib finds no formula and no letter without a shape, for names that users choose."""
+    return visible(text).replace("$", r"\$")
 
 
 def check_channel(channel: object, names: Sequence[str]) -> None:

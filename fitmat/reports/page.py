@@ -34,6 +34,7 @@ from fitmat.reports.pictures import reason
 from fitmat.reports.rows import parameter_rows, prior_rows
 from fitmat.studies import record
 from fitmat.studies.study import Study
+from fitmat.text import visible
 from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS, Posterior
 
 if TYPE_CHECKING:
@@ -116,7 +117,11 @@ def to_html(study: Study) -> str:
 
 def _rendered(study: Study, pictures: "_Pictures") -> str:
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("fitmat.reports"), autoescape=True, trim_blocks=True, lstrip_blocks=True
+        loader=jinja2.PackageLoader("fitmat.reports"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=_visible,
     )
     environment.filters |= {"picture": pictures.embedded, "subscripted": _subscripted}
     findings = study.findings
@@ -214,6 +219,11 @@ def _drawn(study: Study) -> list[int]:
     if not study.full:
         return [last // 2]
     return [int(k) for k in np.unique(np.linspace(0, last, CHANNELS_DRAWN).astype(int))]
+
+
+def _visible(value: Any) -> Any:
+    """Text as the page shows it, without marks that would turn or hide what follows."""
+    return visible(value, keep="\n") if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
 def _subscripted(symbol: str) -> Markup:

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from fitmat.studies.findings import Findings
-from fitmat.text import interval, with_error
+from fitmat.text import interval, visible, with_error
 from fitmat.uncertainty.quantities import UNDETERMINED
 
 
@@ -23,7 +23,7 @@ def parameter_rows(found: Findings) -> list[dict[str, str]]:
         for q in quantities:
             for k in range(len(q.value)):
                 low, high = q.ci95[k]
-                channel = f" {channels[k]}" if q.per_channel and len(channels) > 1 else ""
+                channel = f" {visible(channels[k])}" if q.per_channel and len(channels) > 1 else ""
                 free = q.remark != "fixed" and np.isfinite(low) and np.isfinite(high)
                 sd = math.nan if q.remark == UNDETERMINED else q.sd[k]
                 result.append(

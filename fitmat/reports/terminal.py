@@ -4,7 +4,6 @@ It computes nothing and writes to stdout only.
 """
 
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -14,11 +13,14 @@ from fitmat.fitting.result import RESULTS
 from fitmat.reports.rows import parameter_rows
 from fitmat.studies.findings import Findings
 from fitmat.studies.study import MOST_SAMPLED, Study
+from fitmat.text import visible
 
 
-def _say(out: Console, words: str, **how: Any) -> None:
-    """Print words, wrapped at the edge of a terminal, and not at all where there is none."""
-    out.print(words, highlight=False, soft_wrap=not out.is_terminal or out.is_dumb_terminal, **how)
+def _say(out: Console, *parts: str | tuple[str, str]) -> None:
+    """Print words, some with a style, wrapped at the edge of a terminal, and not at all where there is none."""
+    styled = (part if isinstance(part, tuple) else (part, "") for part in parts)
+    text = Text.assemble(*((visible(words, keep="\n"), style) for words, style in styled))
+    out.print(text, soft_wrap=not out.is_terminal or out.is_dumb_terminal)
 
 
 def show(found: Study, report: Path, screen: Console | None = None) -> None:
@@ -31,10 +33,10 @@ def show(found: Study, report: Path, screen: Console | None = None) -> None:
     """
     out = screen or Console()
     first = found.findings[0].fit
-    _say(out, str(first.measurements), markup=False)
-    _say(out, first.noise.words, markup=False)
+    _say(out, str(first.measurements))
+    _say(out, first.noise.words)
     for warning in found.warnings:
-        _say(out, f"WARNING: {warning}", markup=False)
+        _say(out, f"WARNING: {warning}")
     if first.n_values > MOST_SAMPLED:
         words = f"More than {MOST_SAMPLED:,} values: intervals from Laplace's approximation, nothing is sampled."
         _say(out, words)
@@ -42,32 +44,31 @@ def show(found: Study, report: Path, screen: Console | None = None) -> None:
         _say(out, f"The loss {first.loss.name} is an objective: single fits, without a posterior.")
     shown = found.detailed
     for one in shown:
-        _say(out, f"\n[bold]{_title(one)}[/bold]")
+        _say(out, (f"\n{_title(one)}", "bold"))
         out.print(_table(one))
         _remark(out, one)
-    _say(out, "\n→ follows from the parameters above it", style="dim")
+    _say(out, ("\n→ follows from the parameters above it", "dim"))
     if len(shown) < len(found.findings):
-        _say(out, f"{len(found.findings) - len(shown)} more models: see the report.", style="dim")
+        _say(out, (f"{len(found.findings) - len(shown)} more models: see the report.", "dim"))
     verdicts = [] if found.choice is None or len(found.findings) == len(shown) else [found.choice.verdict]
     adequate = " ".join(f"{one.name} {one.fit.adequacy}." for one in found.findings)
     for words in (*verdicts, found.match.verdict if found.match else adequate):
-        _say(out, f"\n[bold]{words}[/bold]")
-    out.print(f"\nReport: {report}", markup=False, highlight=False, soft_wrap=True)
+        _say(out, (f"\n{words}", "bold"))
+    out.print(Text(f"\nReport: {visible(str(report))}"), soft_wrap=True)
 
 
 def _remark(out: Console, found: Findings) -> None:
     """How a fit ended, what speaks against it, and what the angles determine."""
     result, against = found.fit.result, found.doubts
     if result != "converged":
-        words = f"[yellow]{result}[/yellow]: {RESULTS[result]}"
-        _say(out, words)
+        _say(out, (result, "yellow"), f": {RESULTS[result]}")
     if found.posterior.interrupted:
-        _say(out, "[yellow]interrupted[/yellow]: sampling was stopped; what was done is kept.")
+        _say(out, ("interrupted", "yellow"), ": sampling was stopped; what was done is kept.")
     if against.words:
-        _say(out, f"[yellow]{'in doubt' if against.inadequate else 'note'}[/yellow]: {against}")
+        _say(out, ("in doubt" if against.inadequate else "note", "yellow"), f": {against}")
     for said in (found.identifiability, found.second_opinion):
         if said is not None:
-            _say(out, said.words, markup=False)
+            _say(out, said.words)
 
 
 def _title(found: Findings) -> str:
@@ -85,5 +86,5 @@ def _table(found: Findings) -> Table:
     for row in parameter_rows(found):
         name = f"→ {row['name']}" if row["kind"] == "follows" else row["name"]
         remark = " ".join(part for part in (row["unit"], row["remark"].removesuffix(" by these angles")) if part)
-        table.add_row(*(Text(cell) for cell in (name, row["symbol"], row["value"], row["interval"], remark)))
+        table.add_row(*(Text(visible(cell)) for cell in (name, row["symbol"], row["value"], row["interval"], remark)))
     return table

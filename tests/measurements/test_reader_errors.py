@@ -199,7 +199,7 @@ def test_odd_names_and_texts_are_shown_plainly():
         read({**angles, "brdf": np.array(["\ud800"])})
     with pytest.raises(ReadError, match=r"column brdf is not an array .*, expected \(n,\) numbers or texts"):
         read({**angles, "brdf": np.zeros(1, [("a", float), ("b", int)])})
-    with pytest.raises(ReadError, match=r"the columns are theta_i, theta_o, a b, �\[2J, expected a measured"):
+    with pytest.raises(ReadError, match=r"the columns are theta_i, theta_o, a b, \\u001b\[2J, expected a measured"):
         read({**angles, "a\n b": [1.0], "\x1b[2J": [1.0]})
 
 

@@ -27,7 +27,7 @@ def albedos(found: Sequence[ImpliedAlbedo], channels: Sequence[str]) -> Said:
     for a in found:
         if a.too_large.any():
             k = int(np.nanargmax(np.where(a.too_large, a.value, -np.inf)))
-            where = f" in channel {channels[k]}" if len(channels) > 1 else ""
+            where = f" in {say.channels(channels[k : k + 1])}" if len(channels) > 1 else ""
             said.warnings.append(
                 f"At {say.degrees(a.theta_i)} incidence the values{where} add up to an albedo of "
                 f"{with_error(float(a.value[k]), float(a.error[k]))}{_as_round(a)}, more light than falls on the "

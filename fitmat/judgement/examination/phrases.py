@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fitmat.text import visible
+
 LISTED = 12
 """No list of names is longer than this."""
 
@@ -26,7 +28,7 @@ def count(number: int, thing: str) -> str:
 
 def channels(names: Sequence[str]) -> str:
     """`channel r`, `channels r, g`."""
-    listed = ", ".join(names[:LISTED]) + (" …" if len(names) > LISTED else "")
+    listed = ", ".join(map(visible, names[:LISTED])) + (" …" if len(names) > LISTED else "")
     return ("channel " if len(names) == 1 else "channels ") + listed
 
 

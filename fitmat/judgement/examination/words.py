@@ -13,6 +13,7 @@ from fitmat.judgement.examination.coverage import NEAR, Coverage
 from fitmat.judgement.examination.phrases import LISTED, Said
 from fitmat.judgement.examination.value_range import ValueRange
 from fitmat.measurements.samples import Measurements
+from fitmat.text import visible
 
 GRAZING = np.deg2rad(60.0)
 """Files that stay below this zenith angle say nothing of grazing reflection."""
@@ -23,9 +24,9 @@ Law = tuple[float, float] | None
 
 def title(m: Measurements) -> Said:
     """How much there is, and what of it cannot be used."""
-    channels = f"channel {m.channels[0]}" if len(m.channels) == 1 else f"{len(m.channels)} channels"
+    channels = say.channels(m.channels) if len(m.channels) == 1 else f"{len(m.channels)} channels"
     if 1 < len(m.channels) <= LISTED:
-        channels += f" ({', '.join(m.channels)})"
+        channels += f" ({', '.join(map(visible, m.channels))})"
     lines = [f"{m.source}: {say.count(m.n_samples, 'sample')}, {channels}."]
     lines += [f"Not used, {reason}: {say.count(count, 'row')}." for reason, count in m.masked.items()]
     empty = [name for name, used in zip(m.channels, m.valid.T, strict=True) if not used.any()]

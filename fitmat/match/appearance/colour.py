@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.match.appearance import differences
-from fitmat.text import brief
+from fitmat.text import brief, visible
 
 COVERED = 0.95
 """Share of each colour-matching function that must lie between the first and the last wavelength."""
@@ -133,7 +133,7 @@ def _spectral(wavelengths: Float[np.ndarray, " c"]) -> Colouring:
 
 
 def _listed(names: tuple[str, ...]) -> str:
-    return ", ".join(names if len(names) < 5 else (*names[:2], "…", names[-1]))
+    return ", ".join(map(visible, names if len(names) < 5 else (*names[:2], "…", names[-1])))
 
 
 @functools.cache

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from fitmat.errors import ReadError
+from fitmat.text import visible
 
 HEAD = 65_536
 """Bytes by which a format is recognised."""
@@ -28,7 +29,7 @@ _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 def shown(text: str, longest: int = 40) -> str:
     """Text of the user's as messages show it: in one line, not long, without what a terminal would obey."""
     begin = " ".join(text[: 8 * longest].split())
-    return _plain(begin[:longest]) + ("…" if len(begin) > longest or len(text) > 8 * longest else "")
+    return visible(begin[:longest]) + ("…" if len(begin) > longest or len(text) > 8 * longest else "")
 
 
 def listed(names: Iterable[str], most: int = 20) -> str:
@@ -39,11 +40,7 @@ def listed(names: Iterable[str], most: int = 20) -> str:
 
 def name(path: str | os.PathLike[str]) -> str:
     """The file's name as messages show it."""
-    return _plain(Path(path).name)
-
-
-def _plain(text: str) -> str:
-    return "".join(letter if letter.isprintable() else "�" for letter in text)
+    return visible(Path(path).name)
 
 
 def is_stream(path: str | os.PathLike[str]) -> bool:
