@@ -32,6 +32,7 @@ class Options:
         where: NAME=VALUE of the rows of a table to read; None for all.
         panel: Reflectance factor of the white panel to which readings were compared, 0 to 2.
         unknown_scale: Whether the values are known but for a factor that all of them share.
+        doubtful: Whether angles that look like radians are asked about; a part of a file cannot tell.
     """
 
     quantity: str | None = None
@@ -43,6 +44,7 @@ class Options:
     where: str | None = None
     panel: float | None = None
     unknown_scale: bool = False
+    doubtful: bool = True
 
     def __post_init__(self) -> None:
         self._refuse_kinds()

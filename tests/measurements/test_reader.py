@@ -411,7 +411,7 @@ def test_documented_aliases(kind, alias):
         ("θi (deg)", Role("theta_i")),
         ("brdf_error", None),
         ("theta_i [mrad]", None),
-        ("reflectance_factor [%]", None),
+        ("reflectance_factor [%]", Role("reflectance_factor")),
         ("phi_r", Role("phi_o")),
     ],
 )

@@ -110,7 +110,7 @@ def scan(
     """
     options = Options(**conventions)
     # One chunk may hold small angles only; whether all do is asked at the end. Rows are chosen here.
-    lenient = dataclasses.replace(options, angle_unit=options.angle_unit or "degrees", where=None)
+    lenient = dataclasses.replace(options, doubtful=False, where=None)
     look = FirstPass(part)
     for table in _chosen(path, rows, options.where):
         _refuse_long(table, columns, options)
@@ -144,10 +144,16 @@ def scan(
 def _chosen(path: str | os.PathLike[str], rows: int, where: str | None) -> Iterator[Table]:
     """The tables of a file, or of each what `where` chooses; tables without such rows are passed over."""
     name, _, value = (part.strip() for part in (where or "").partition("="))
+    kinds = set[bool | None]()
     for table in tables.tables(path, rows, words=name):
         if where is None:
             yield table
-        elif name not in table.names or (table.words(table.names.index(name)) == value).any():
+            continue
+        kinds |= {table.is_numeric(name)} if name in table.names else set()
+        if kinds >= {True, False}:
+            got = f"numbers and, from row {table.lines[0]} on, text in the column {contents.shown(name)}"
+            raise ReadError(f"{table.source}: {got}, expected one of both for --where. Write them alike.")
+        if name not in table.names or table.matches(name, value).any():
             yield dataclasses.replace(table.chosen(where), notes=(*table.notes, f"Only rows with {name} = {value}."))
 
 

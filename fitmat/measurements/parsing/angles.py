@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from fitmat.errors import ReadError
 from fitmat.measurements.options import Options
+from fitmat.measurements.parsing import units
 from fitmat.measurements.parsing.table import Table
 
 ROUNDING = 1e-6
@@ -35,16 +36,18 @@ def directions(
         ReadError: an angle is text or out of range, the unit is doubtful, or an option cannot apply.
     """
     angles = {name: table.numbers(column) for name, column in columns.items()}
-    _refuse_doubtful_unit(table, angles, options)
-    scale = 1.0 if options.angle_unit == "radians" else np.pi / 180
-    for name, angle in angles.items():
-        beyond = np.isfinite(angle) & (np.abs(angle * scale) > np.deg2rad(_LIMIT[name]) + ROUNDING)
-        unit = "radians" if options.angle_unit == "radians" else "degrees"
+    stated = _stated_units(table, columns, options)
+    _refuse_doubtful_unit(table, {name: angle for name, angle in angles.items() if name not in stated}, options)
+    unit_of = {name: stated.get(name, options.angle_unit or "degrees") for name in columns}
+    for name, unit in unit_of.items():
+        angle = angles[name]
+        angles[name] = angle if unit == "radians" else np.deg2rad(angle)
+        beyond = np.isfinite(angle) & (np.abs(angles[name]) > np.deg2rad(_LIMIT[name]) + ROUNDING)
         limit = f"{np.deg2rad(_LIMIT[name]):.5g}" if unit == "radians" else f"{_LIMIT[name]}"
         expected = f"−{limit} to {limit} {unit}. Is the column, or its unit (--angle-unit), another one?"
         table.refuse(columns[name], beyond, expected)
-    phi_i, phi_o, note = _azimuths(table, {name: scale * angle for name, angle in angles.items()}, options)
-    theta_i, theta_o = scale * angles["theta_i"], scale * angles["theta_o"]
+    phi_i, phi_o, note = _azimuths(table, angles, options)
+    theta_i, theta_o = angles["theta_i"], angles["theta_o"]
     found = np.stack(
         [
             np.abs(theta_i),
@@ -55,7 +58,28 @@ def directions(
         axis=1,
     )
     found[~np.isfinite(found).all(axis=1)] = np.nan
-    return found, (*(["Angles read as radians."] if scale == 1.0 else []), note)
+    radians = [name for name, unit in unit_of.items() if unit == "radians"]
+    told = "Angles" if len(radians) == len(unit_of) else ", ".join(radians)
+    return found, (*([f"{told} read as radians."] if radians else []), note)
+
+
+def _stated_units(table: Table, columns: Mapping[str, int], options: Options) -> dict[str, str]:
+    """Angle → unit, where the header says it.
+
+    Raises:
+        ReadError: the header and an option say different units.
+    """
+    written = {name: units.split(table.names[column])[1] for name, column in columns.items()}
+    stated = {
+        name: {"deg": "degrees", "rad": "radians"}[unit] for name, unit in written.items() if unit in ("deg", "rad")
+    }
+    for name, unit in stated.items():
+        if options.angle_unit not in (None, unit):
+            got = f"the header says {table.label(columns[name])}, --angle-unit says {options.angle_unit}"
+            raise ReadError(
+                f"{table.source}: {got}, expected them to agree. Correct the header, or leave the flag out."
+            )
+    return stated
 
 
 def _azimuths(table: Table, angles: Mapping[str, np.ndarray], options: Options) -> tuple[np.ndarray, np.ndarray, str]:
@@ -85,9 +109,11 @@ def _azimuths(table: Table, angles: Mapping[str, np.ndarray], options: Options) 
 
 
 def _refuse_doubtful_unit(table: Table, angles: Mapping[str, np.ndarray], options: Options) -> None:
-    zenith = np.abs(np.concatenate([angles["theta_i"], angles["theta_o"]]))
+    zenith = np.abs(
+        np.concatenate([np.zeros(0), *(angle for name, angle in angles.items() if name.startswith("theta"))])
+    )
     largest = np.max(zenith[np.isfinite(zenith)], initial=0.0)
-    if options.angle_unit is None and _RADIANS[0] < largest <= _RADIANS[1]:
+    if options.angle_unit is None and options.doubtful and _RADIANS[0] < largest <= _RADIANS[1]:
         expected = "expected degrees; they look like radians"
         remedy = "Confirm with --angle-unit radians or --angle-unit degrees (angle_unit=)."
         raise ReadError(f"{table.source}: no zenith angle exceeds {largest:g}, {expected}. {remedy}")

@@ -10,7 +10,7 @@ import re
 import polars as pl
 
 from fitmat.errors import ReadError
-from fitmat.measurements.parsing import contents
+from fitmat.measurements.parsing import contents, units
 from fitmat.measurements.parsing.table import ERROR_VALUES, MISSING, Table
 
 WIDEST = 4096
@@ -22,13 +22,14 @@ _ERROR_VALUE = rf"(?i)^\s*({'|'.join(map(re.escape, ERROR_VALUES))})\s*([,;\t]|[
 _SEMICOLON = r"^\s*;"
 _BLANK = r"^[\s,;]*$"
 _QUOTED = r'"[^"]*"'
-_NUMBER = re.compile(r"[-+−]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?|[-+]?(?i:inf|infinity)")
-_SAMPLE = 20
-_DECIMAL_COMMA = r"^[-+−]?\d*,\d+([eE][-+]?\d+)?$"
+_NUMBER = re.compile(r"[-+−]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][-+]?\d+)?|[-+]?(?i:inf|infinity)")
+_SEPARATOR = re.compile(r'(?i)^\s*"?sep=(.)"?\s*$')
+_SAMPLE, _NOTES = 20, 200
+_DECIMAL_COMMA = r"^[-+−]?\d*,\d+([eEdD][-+]?\d+)?$"
 _GROUPED = r"^[-+−]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?$"
 _SURELY_GROUPED = r"^[-+−]?([1-9]\d*|[1-9]\d{0,2}(,\d{3}){2,}|[1-9]\d{0,2}(,\d{3})+\.\d*)$"
 _THOUSANDS = "Commas read as thousands separators in:"
-_DECIMAL_POINT = r"^[-+−]?\d*\.\d+([eE][-+]?\d+)?$"
+_DECIMAL_POINT = r"^[-+−]?\d*\.\d+([eEdD][-+]?\d+)?$"
 
 
 def load(path: str | os.PathLike[str]) -> Table:
@@ -46,32 +47,48 @@ def parse(text: str, source: str, notes: tuple[str, ...], above: int = 0) -> Tab
     """The table in a text whose first line is line `above` + 1 of its file."""
     lines = pl.DataFrame({"text": re.split(r"\r\n|\r|\n", text)}).with_row_index("line", offset=1 + above)
     lines = lines.filter(~pl.col("text").str.contains(_BLANK))
-    comment = lines["text"].str.contains(_COMMENT) & ~lines["text"].str.contains(_ERROR_VALUE)
-    delimiter = _delimiter(lines.filter(~comment)["text"].head(_SAMPLE).to_list())
-    if delimiter != ";":
-        comment |= lines["text"].str.contains(_SEMICOLON)
-    rows = lines.filter(~comment)
+    rows, comments, delimiter, told = _laid_out(lines)
     if rows.is_empty():
         expected = "expected a header line and rows of numbers. Is it the right file?"
         raise ReadError(f"{source}: nothing but comments or blank lines, {expected}")
     rows = rows.with_columns(text=_tidy(rows["text"], delimiter))
     _refuse_ragged(rows, delimiter or "\t", source)
     cells = _cells(rows, delimiter or "\t", source)
-    before = lines.filter(comment & (lines["line"] < rows["line"][0]) & lines["text"].str.contains(r"\pL"))
+    before = comments.filter((comments["line"] < rows["line"][0]) & comments["text"].str.contains(r"\pL"))
     names = tuple(cells.row(0))
     _refuse_missing_names(names, source, int(rows["line"][0]))
     if any(_is_number(cell) for cell in names):
         names = _commented(before["text"].tail(1).to_list(), delimiter, cells.width)
     else:
         rows, cells = rows.slice(1), cells.slice(1)
+    if cells.height and units.is_row(below := cells.row(0)):
+        told = (*told, f"Row {rows['line'][0]} read as units: {contents.listed(below)}.")
+        names = tuple(units.named(*pair) for pair in zip(names, below, strict=True))
+        rows, cells = rows.slice(1), cells.slice(1)
     if cells.is_empty():
         expected = "expected rows of numbers below it. Is the file complete?"
         raise ReadError(f"{source}: a header and no rows ({contents.listed(names)}), {expected}")
-    table = Table(source, names, cells, rows["line"].to_numpy(), notes)
+    table = Table(source, names, cells, rows["line"].to_numpy(), (*notes, *told))
     if delimiter == ",":
         table = _without_thousands(table)
     _refuse_mixed_decimals(table)
     return table
+
+
+def _laid_out(lines: pl.DataFrame) -> tuple[pl.DataFrame, pl.DataFrame, str | None, tuple[str, ...]]:
+    """The lines from the header on, the comments, what separates the cells, and what stood above the header."""
+    comment = lines["text"].str.contains(_COMMENT) & ~lines["text"].str.contains(_ERROR_VALUE)
+    given = _SEPARATOR.match(lines["text"][0]) if len(lines) else None
+    if given:
+        lines, comment = lines.slice(1), comment.slice(1)
+    delimiter, above = _delimiter_and_notes(lines.filter(~comment)["text"].head(_NOTES).to_list(), given)
+    if delimiter != ";":
+        comment |= lines["text"].str.contains(_SEMICOLON)
+    rows = lines.filter(~comment)
+    if not above:
+        return rows, lines.filter(comment), delimiter, ()
+    told = contents.listed(" ".join(line.split()) for line in rows["text"].head(above))
+    return rows.slice(above), lines.filter(comment), delimiter, (f"Read as notes, above the header: {told}.",)
 
 
 def _delimiter(lines: list[str]) -> str | None:
@@ -84,12 +101,35 @@ def _delimiter(lines: list[str]) -> str | None:
     return None
 
 
+def _delimiter_and_notes(lines: list[str], given: re.Match[str] | None) -> tuple[str | None, int]:
+    """What separates the cells, and how many lines above the header are no part of the table.
+
+    The header is the line above the first numbers, or above the units above them, if it has as many cells as these.
+    """
+    first = next((k for k, line in enumerate(lines) if _is_data(line)), 0)
+    for head in (first - 1, first - 2):
+        below = lines[max(head, 0) :]
+        delimiter = given[1].strip(" ") or None if given else _delimiter(below[:_SAMPLE])
+        cells = [[cell.strip() for cell in re.sub(_QUOTED, "x", line).split(delimiter)] for line in below[:3]]
+        if head > 0 and len({len(row) for row in cells}) == 1 < len(cells[0]):
+            words = not any(_is_number(cell) for cell in cells[0])
+            if words and (head == first - 2 or not units.is_row(tuple(cells[0]))):
+                return delimiter, head
+    return given[1].strip(" ") or None if given else _delimiter(lines[:_SAMPLE]), 0
+
+
+def _is_data(line: str) -> bool:
+    """Whether most words of a line are numbers."""
+    words = re.split(r"[,;\t\s]+", line.replace('"', " ").strip())
+    return len(words) > 1 and 2 * sum(bool(_NUMBER.fullmatch(word)) for word in words) > len(words)
+
+
 def _tidy(lines: pl.Series, delimiter: str | None) -> pl.Series:
     """White space as one tab; no blanks between delimiter and quote, which CSV forbids and people write."""
     if delimiter is None:
         return lines.str.strip_chars().str.replace_all(r"\s+", "\t")
     if lines.str.contains('"', literal=True).any():
-        return lines.str.replace_all(rf'(^|{delimiter}) *("(?:[^"]|"")*") *', "${1}${2}")
+        return lines.str.replace_all(rf'(^|{re.escape(delimiter)}) *("(?:[^"]|"")*") *', "${1}${2}")
     return lines
 
 

@@ -9,7 +9,8 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from fitmat.errors import ReadError
-from fitmat.measurements.parsing.contents import listed
+from fitmat.measurements.parsing import units
+from fitmat.measurements.parsing.contents import listed, shown
 from fitmat.measurements.parsing.table import Table
 from fitmat.measurements.quantity import QUANTITIES
 
@@ -34,15 +35,15 @@ ALIASES = {
     "valid": (),
     "invalid": ("flag",),
 }
-"""Our name → its aliases; letter case, spaces, hyphens, Greek letters, [deg], [1/sr], [nm] do not matter."""
+"""Our name → its aliases; letter case, spaces, hyphens, Greek letters and units behind it do not matter."""
 
 VALUES = (*QUANTITIES, "signal", "value")
 EXAMPLE = 'columns="theta_i=Zenith,theta_o=3" (--columns)'
 
+_ANGLES = ("theta_i", "theta_o", "phi", "phi_i", "phi_o")
 _BESIDE = ("sigma", "reference", "sigma_reference")
 _KINDS = {alias: kind for kind, others in ALIASES.items() for alias in (kind, *others)}
 _GREEK = str.maketrans({"θ": "theta", "ϑ": "theta", "φ": "phi", "ϕ": "phi", "λ": "lambda", "σ": "sigma"})
-_UNIT = re.compile(r" ?[\[(](deg|degrees?|°|1/sr|sr-1|sr\^-1|sr\^\{-1\}|sr⁻¹|nm)[\])]\s*$")
 _CHANNELS = {"red": "r", "green": "g", "blue": "b"} | {name: name for name in "rgbxyz"}
 _RIVALS = (VALUES, ("wavelength", "channel"), ("phi", "phi_i"), ("phi", "phi_o"), ("sigma",))
 
@@ -90,7 +91,7 @@ def assign(table: Table, columns: str | Mapping[str, str | int] | None, quantity
     """
     said = _said(table, columns)
     roles = said | _recognised(table, said)
-    angles = {k: roles[Role(k)] for k in ("theta_i", "theta_o", "phi", "phi_i", "phi_o") if Role(k) in roles}
+    angles = {k: roles[Role(k)] for k in _ANGLES if Role(k) in roles}
     _refuse_angles(table, angles)
     kind, quantity = _quantity(table, roles, quantity)
     values = {role.channel: column for role, column in roles.items() if role.kind == kind}
@@ -114,7 +115,7 @@ def role(name: str, *, any_channel: bool = False) -> Role | None:
         >>> role("BRDF_550nm")
         Role(kind='brdf', channel='550')
     """
-    plain = _UNIT.sub("", " ".join(name.split()).lower().translate(_GREEK)).strip()
+    plain = units.split(" ".join(name.split()))[0].lower().translate(_GREEK).strip()
     plain = re.sub(r"[\s\-_]+", "_", plain)
     if plain in _KINDS:
         return Role(_KINDS[plain])
@@ -159,6 +160,7 @@ def _position(table: Table, theirs: str | int) -> int:
     named = [(k, other) for k, other in enumerate(table.names) if other]
     same = [k for k, other in named if other == name]
     same = same or [k for k, other in named if other.lower() == name.lower()]
+    same = same or [k for k, other in named if units.split(other)[0].lower() == name.lower()]
     if len(same) > 1:
         expected = f"expected one. Say which by its number, 1 to {len(table.names)}."
         raise ReadError(f"{table.source}: {len(same)} columns are named {name}, {expected}")
@@ -179,6 +181,8 @@ def _recognised(table: Table, said: Mapping[Role, int]) -> dict[Role, int]:
     found: dict[Role, int] = {}
     for column, name in enumerate(table.names):
         mine = role(name)
+        if mine is None and column not in said.values():
+            _refuse_foreign_unit(table, name)
         if mine is None or mine in said or mine.kind in replaced or column in said.values():
             continue
         if mine in found:
@@ -186,6 +190,15 @@ def _recognised(table: Table, said: Mapping[Role, int]) -> dict[Role, int]:
             raise ReadError(f"{table.source}: {both} are both {mine}, expected one. {_choose(str(mine))}")
         found[mine] = column
     return found
+
+
+def _refuse_foreign_unit(table: Table, name: str) -> None:
+    """Stop at an angle or a wavelength in a unit that is not known; it would count as not there."""
+    behind = units.bracket(name)
+    if behind is not None and (known := role(behind[0])) and known.kind in (*_ANGLES, "wavelength"):
+        expected = "nm or µm" if known.kind == "wavelength" else "deg or rad"
+        got = f"the column {shown(name)} is in {shown(behind[1]) or 'no unit'}, expected {expected}"
+        raise ReadError(f"{table.source}: {got}. Convert it, or say what it is: {EXAMPLE}.")
 
 
 def _refuse_angles(table: Table, angles: Mapping[str, int]) -> None:

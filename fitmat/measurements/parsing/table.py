@@ -21,6 +21,7 @@ MISSING = ("", "nan", "na", "n/a", "<na>", "null", "none", "-", *ERROR_VALUES)
 """Cells that hold no number and say so, in lower case."""
 
 _TRUTH = {"true": "1", "t": "1", "yes": "1", "y": "1", "false": "0", "f": "0", "no": "0", "n": "0"}
+_FORTRAN = r"^([-+]?\d*\.?\d*)d([-+]?\d+)$"
 _PLAIN = {"−": "-", ",": "."}
 
 
@@ -86,13 +87,27 @@ class Table:
             there = listed(self.names) or "none has a name"
             raise ReadError(f"{self.source}: where = {where!r} (--where), expected a column of {there}. Correct it.")
         words = self.words(self.names.index(name))
-        rows = np.flatnonzero(words == value)
+        rows = np.flatnonzero(self.matches(name, value))
         if not len(rows):
             found = list(dict.fromkeys(words.tolist()))
             expected = f"expected one of {listed(found)}. Choose one (--where)"
             raise ReadError(f"{self.source}: {shown(name)} is never {value!r}, {expected}.")
         noted = (*self.notes, f"Only rows with {name} = {value}: {len(rows)} of {len(words)}.")
         return dataclasses.replace(self, cells=self.cells[rows], lines=self.lines[rows], notes=noted)
+
+    def matches(self, name: str, value: str) -> Bool[np.ndarray, " n"]:
+        """Rows in which the column of that name has that value: as a number where all its cells are, else as text."""
+        words = self.words(self.names.index(name))
+        wanted = _numbers(pl.Series([value.lower()]))[0]
+        if wanted is None or not self.is_numeric(name):
+            return words == value
+        return (_numbers(self._lower(self.names.index(name))) == wanted).fill_null(False).to_numpy()
+
+    def is_numeric(self, name: str) -> bool | None:
+        """Whether every cell of a column that is not missing is a number; None where all are missing."""
+        text = self._lower(self.names.index(name))
+        text = text.filter(~text.is_in(MISSING))
+        return bool(_numbers(text).is_not_null().all()) if len(text) else None
 
     def refuse(self, column: int, bad: Bool[np.ndarray, " n"], expected: str) -> None:
         """Stop at the first bad cell of a column.
@@ -110,10 +125,16 @@ class Table:
     def _cast(self, column: int, text: pl.Series, expected: str) -> Float[np.ndarray, " n"]:
         if (cells := self.cells.to_series(column)).dtype.is_float():
             return cells.to_numpy()
-        number = text.str.replace_many(_PLAIN).cast(pl.Float64, strict=False)
+        number = _numbers(text)
         bad = (number.is_null() & ~text.is_in(MISSING)).to_numpy()
         self.refuse(column, bad, f"{expected}. Correct the cell, or put # before the line to leave it out.")
         return number.fill_null(np.nan).to_numpy()
+
+
+def _numbers(text: pl.Series) -> pl.Series:
+    """Cells in lower case as numbers, null where they are none; Fortran writes 1.2d-02 for 1.2e-02."""
+    plain = text.str.replace_many(_PLAIN)
+    return plain.str.replace(_FORTRAN, "${1}e${2}").cast(pl.Float64, strict=False)
 
 
 def from_arrays(arrays: Mapping[str, np.ndarray], source: str) -> Table:

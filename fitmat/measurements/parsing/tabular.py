@@ -7,11 +7,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from fitmat.errors import ReadError
 from fitmat.maths.directions import from_angles
 from fitmat.measurements.options import Options
-from fitmat.measurements.parsing import contents
+from fitmat.measurements.parsing import contents, units
 from fitmat.measurements.parsing.angles import directions
-from fitmat.measurements.parsing.columns import assign
+from fitmat.measurements.parsing.columns import Columns, assign
 from fitmat.measurements.parsing.recording import Recording, pivot, sentinels
 from fitmat.measurements.parsing.table import Table
 from fitmat.measurements.samples import default_channels
@@ -34,6 +35,9 @@ def recording(table: Table, columns: str | Mapping[str, str | int] | None, optio
     angles, assumed = directions(table, layout.angles, options)
     theta_i, phi_i, theta_o, phi_o = angles.T
     value, sigma = _stacked(table, layout.values), _stacked(table, layout.sigmas) if layout.sigmas else None
+    if percent := _percent(table, layout):
+        value, sigma = value / percent, None if sigma is None else sigma / percent
+        assumed = (*assumed, "Values in %, as the header says, divided by 100.")
     doubts = {"flagged invalid": np.broadcast_to(_flagged(table, layout.marks)[:, None], value.shape)}
     if layout.quantity == "signal":
         reference = _stacked(table, layout.references)
@@ -58,6 +62,28 @@ def recording(table: Table, columns: str | Mapping[str, str | int] | None, optio
 
 def _stacked(table: Table, columns: Mapping[str, int]) -> np.ndarray:
     return np.stack([table.numbers(column) for column in columns.values()], axis=1)
+
+
+def _percent(table: Table, layout: Columns) -> int:
+    """100 where the values are percentages, 0 where they are not; σ is in the unit of its values.
+
+    Raises:
+        ReadError: some columns are in % and others not, or a quantity that has a unit of its own is.
+    """
+    stated = {c: units.split(table.names[c])[1] == "%" for c in (*layout.values.values(), *layout.sigmas.values())}
+    others = [*layout.references.values(), *layout.reference_sigmas.values()]
+    if not any(stated.values()) and not any(units.split(table.names[c])[1] == "%" for c in others):
+        return 0
+    if layout.quantity not in ("reflectance_factor", "panel_ratio"):
+        got = f"{layout.quantity} or its sigma in %, expected {layout.quantity} in its own unit"
+        remedy = (
+            "Is it a reflectance factor (--columns reflectance_factor=…)? A sigma in % of the value: multiply it out"
+        )
+        raise ReadError(f"{table.source}: {got}. {remedy}.")
+    if not all(stated[c] for c in layout.values.values()):
+        named = contents.listed(table.label(c) for c, is_percent in stated.items() if is_percent)
+        raise ReadError(f"{table.source}: only {named} in %, expected all values alike. Write them in one unit.")
+    return 100
 
 
 def _ratio(
@@ -87,6 +113,8 @@ def _labels(table: Table, marks: Mapping[str, int]) -> np.ndarray | None:
     """Channel of each row, (n,), as wavelength or as text; None where columns are channels."""
     if "wavelength" in marks:
         labels = table.numbers(marks["wavelength"])
+        if units.split(table.names[marks["wavelength"]])[1] == "µm":
+            labels = np.round(1000 * labels, 6)
         wrong, expected = ~(np.isfinite(labels) & (labels > 0)), "a wavelength in nm"
     elif "channel" in marks:
         labels = table.words(marks["channel"])
