@@ -30,7 +30,7 @@ BAD_FILES: dict[str, tuple[str | bytes, str]] = {
     "NUL bytes": (b"theta_i\x00,theta_o\n", "a binary file or an unknown encoding.*Export it as CSV"),
     "undecodable": (b"theta_i,theta_o\n\x81\x8d", "a binary file or an unknown encoding"),
     "half of UTF-16": (b"\xff\xfea", "a binary file or an unknown encoding"),
-    "image": (b"\x89PNG\r\n\x1a\n", "a binary file or an unknown encoding"),
+    "image": (b"\x89PNG\r\n\x1a\n", "a picture, .*Name the file of the numbers behind it"),
     "ragged": ("# a\n" + GOOD + "\n30,45\n", r"bad\.csv row 5: 2 cells, expected 3 as in row 2"),
     "too many cells": (GOOD + "30,45,0,5\n", "row 3: 4 cells, expected 3 as in row 1"),
     "lone quote": (GOOD + '30,45,"0.5\n', r'row 3: a quote \("\) without its end'),

@@ -113,7 +113,7 @@ def _text(path: str | os.PathLike[str], words: str) -> Iterator[Table]:
 
 def _raw(path: str | os.PathLike[str], start: int) -> Iterator[bytes]:
     """The file from a byte on, in blocks of whole lines."""
-    with Path(path).open("rb") as file:
+    with contents.opened(path) as file:
         file.seek(start)
         rest = b""
         while read := file.read(TEXT_BLOCK):

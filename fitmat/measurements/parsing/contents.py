@@ -5,15 +5,20 @@ It knows no format.
 
 import codecs
 import contextlib
+import gzip
+import itertools
 import os
 import re
 import stat
 import tempfile
+import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 from fitmat.errors import ReadError
-from fitmat.text import visible
+from fitmat.measurements.parsing import foreign
+from fitmat.text import for_shell, visible
 
 HEAD = 65_536
 """Bytes by which a format is recognised."""
@@ -21,6 +26,10 @@ HEAD = 65_536
 STREAMED = 1 << 28
 """Bytes that a stream may hold."""
 
+MOST_UNPACKED = 1 << 28
+"""Bytes to which a packed file may unpack; larger tables are read block by block, from an unpacked file."""
+
+_GZIP = b"\x1f\x8b\x08"
 _BOMS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 _LEGACY = "cp1252"
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
@@ -81,16 +90,19 @@ def on_disk(path: str | os.PathLike[str]) -> Iterator[str | os.PathLike[str]]:
 
 
 def size(path: str | os.PathLike[str]) -> int:
-    """Bytes in the file.
+    """Bytes in the file, of one packed by gzip when unpacked.
 
     Raises:
-        ReadError: it cannot be opened, or it is empty.
+        ReadError: it cannot be opened, it is empty, or it unpacks to more than is held in memory.
     """
-    try:
-        with Path(path).open("rb") as file:
+    with opened(path) as file:
+        if isinstance(file, gzip.GzipFile):
+            count = sum(map(len, itertools.takewhile(len, (file.read(HEAD) for _ in range(MOST_UNPACKED // HEAD)))))
+        else:
             count = file.seek(0, os.SEEK_END)
-    except (OSError, ValueError) as error:
-        raise _unopened(path, error) from error
+    if count == MOST_UNPACKED:
+        expected = f"expected less than {MOST_UNPACKED >> 20} MB from a packed file"
+        raise ReadError(f"{name(path)}: unpacks to more, {expected}. Unpack it first: gunzip -k {for_shell(path)}")
     if not count:
         raise ReadError(f"{name(path)}: the file is empty (0 bytes), expected measurements. Was its download cut off?")
     return count
@@ -103,10 +115,26 @@ def contents(path: str | os.PathLike[str], first: int = -1) -> bytes:
         ReadError: it cannot be opened, or it is empty.
     """
     size(path)
+    with opened(path) as file:
+        return file.read(first)
+
+
+@contextlib.contextmanager
+def opened(path: str | os.PathLike[str]) -> Iterator[BinaryIO | gzip.GzipFile]:
+    """The bytes of a file; those of one that gzip packed, unpacked.
+
+    Raises:
+        ReadError: it cannot be opened, or what gzip packed is damaged.
+    """
     try:
         with Path(path).open("rb") as file:
-            return file.read(first)
-    except OSError as error:
+            packed = file.read(len(_GZIP)) == _GZIP
+            file.seek(0)
+            yield gzip.GzipFile(fileobj=file) if packed else file
+    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+        expected = "expected a whole .gz file. Was its download cut off?"
+        raise ReadError(f"{name(path)}: its gzip content is damaged ({error}), {expected}") from error
+    except (OSError, ValueError) as error:
         raise _unopened(path, error) from error
 
 
@@ -123,8 +151,9 @@ def decoded(raw: bytes, source: str) -> tuple[str, tuple[str, ...]]:
     """Bytes as text, and a note where the encoding had to be guessed.
 
     Raises:
-        ReadError: they are no text.
+        ReadError: they are no text, or that of another program.
     """
+    foreign.refuse(raw[:HEAD], source)
     stated = [encoding for bom, encoding in _BOMS.items() if raw.startswith(bom)]
     for encoding in stated or ["utf-8", _LEGACY]:
         try:

@@ -210,7 +210,9 @@ def test_the_trap_springs_where_it_is_unpickled(tmp_path, monkeypatch):
 def test_a_file_name_cannot_break_the_message(tmp_path):
     path = tmp_path / "a\nb\x1b[2J\u202e.csv"
     path.write_bytes(b"x\n1\n")
-    with pytest.raises(ReadError, match=r"^a\\nb\\u001b\[2J\\u202e\.csv: the columns are x, expected theta_i") as raised:
+    with pytest.raises(
+        ReadError, match=r"^a\\nb\\u001b\[2J\\u202e\.csv: the columns are x, expected theta_i"
+    ) as raised:
         read(path)
     assert str(raised.value).isprintable()
 
