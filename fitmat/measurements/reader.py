@@ -14,7 +14,7 @@ import polars as pl
 from fitmat import arguments
 from fitmat.errors import ReadError
 from fitmat.measurements.blocked import without_blocked
-from fitmat.measurements.formats import alta, astm, fred, lighttools, merl, parquet, rgl, ssdd, utia, zemax
+from fitmat.measurements.formats import alta, astm, excel, fred, lighttools, merl, parquet, rgl, ssdd, utia, zemax
 from fitmat.measurements.instrument import IDEAL, Instrument
 from fitmat.measurements.options import Options
 from fitmat.measurements.parsing import cells, contents, frames, tabular
@@ -166,8 +166,8 @@ def _of_file(
     head, size = contents.contents(path, contents.HEAD), contents.size(path)
     layout = next((layout for layout in FORMATS if layout.claims(head, size)), None)
     if layout is None:
-        table = parquet.load(path) if parquet.claims(head, size) else cells.load(path)
-        return tabular.recording(table, columns, options)
+        room = next((room for room in (parquet, excel) if room.claims(head, size)), cells)
+        return tabular.recording(room.load(path), columns, options)
     _refuse_needless(contents.name(path), layout.__name__.rpartition(".")[2], columns, options)
     return layout.load(path)
 

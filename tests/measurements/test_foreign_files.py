@@ -1,12 +1,15 @@
 """Files of other programs are named, with what to do; packed tables and workbooks read like plain ones."""
 
 import gzip
+import importlib
+import zipfile
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 import pytest
 
-from fitmat.errors import ReadError
+from fitmat.errors import FitmatError, ReadError
 from fitmat.measurements.large import chunks
 from fitmat.measurements.parsing import contents
 from fitmat.measurements.reader import read
@@ -96,3 +99,74 @@ def test_damaged_or_endless_gzip_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(contents, "MOST_UNPACKED", 2 * contents.HEAD)
     with pytest.raises(ReadError, match=r"unpacks to more, .*gunzip -k '.*it'\"'\"'s\.gz'"):
         read(written(tmp_path, gzip.compress(bytes(3 * contents.HEAD)), "it's.gz"))
+
+
+def workbook(path: Path, **sheets: list[list[str | float]]) -> Path:
+    """An .xlsx file after ECMA-376, part 1, with text in the cells themselves, written without a library."""
+    kind = "http://schemas.openxmlformats.org"
+    rels = f'<Relationships xmlns="{kind}/package/2006/relationships">{{}}</Relationships>'
+    rel = f'<Relationship Id="r{{0}}" Type="{kind}/officeDocument/2006/relationships/{{1}}" Target="{{2}}"/>'
+    main = f'xmlns="{kind}/spreadsheetml/2006/main" xmlns:r="{kind}/officeDocument/2006/relationships"'
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr(
+            "[Content_Types].xml",
+            f'<Types xmlns="{kind}/package/2006/content-types"><Default Extension="xml" ContentType="application/xml"/>'
+            '<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
+            "</Types>",
+        )
+        file.writestr("_rels/.rels", rels.format(rel.format(1, "officeDocument", "xl/workbook.xml")))
+        listed = "".join(f'<sheet name="{name}" sheetId="{k}" r:id="r{k}"/>' for k, name in enumerate(sheets, 1))
+        file.writestr("xl/workbook.xml", f"<workbook {main}><sheets>{listed}</sheets></workbook>")
+        targets = "".join(rel.format(k, "worksheet", f"worksheets/sheet{k}.xml") for k in range(1, len(sheets) + 1))
+        file.writestr("xl/_rels/workbook.xml.rels", rels.format(targets))
+        for k, rows in enumerate(sheets.values(), 1):
+            lines = (
+                f'<row r="{row}">'
+                + "".join(_cell(f"{chr(64 + c)}{row}", cell) for c, cell in enumerate(cells, 1))
+                + "</row>"
+                for row, cells in enumerate(rows, 1)
+            )
+            file.writestr(
+                f"xl/worksheets/sheet{k}.xml", f"<worksheet {main}><sheetData>{''.join(lines)}</sheetData></worksheet>"
+            )
+    return path
+
+
+def _cell(place: str, value: str | float) -> str:
+    if isinstance(value, str):
+        return f'<c r="{place}" t="inlineStr"><is><t>{value}</t></is></c>' if value else ""
+    return f'<c r="{place}"><v>{value!r}</v></c>'
+
+
+def test_a_workbook_reads_like_its_table(tmp_path):
+    """The layout is that of ECMA-376; the notes, the units and the second sheet are as people leave them."""
+    rows = [
+        ["Sample: Alu"],
+        ["theta_i", "theta_o", "brdf"],
+        ["deg", "deg", "1/sr"],
+        [30, -20.5, 0.5],
+        [30, 30, 1.25e-3],
+    ]
+    found = read(workbook(tmp_path / "lab.xlsx", About=[["Lab 3"]], Scan=rows, Old=[["a", "b"], ["c", "d"]]))
+    assert found.value.tolist() == [[0.5], [0.00125]]
+    assert np.rad2deg(found.signed_theta_o) == pytest.approx([-20.5, 30.0], abs=1e-9)
+    assert "Sheet Scan read. Not read: Old." in found.notes
+
+
+def test_a_damaged_or_empty_workbook_is_refused(tmp_path):
+    path = workbook(tmp_path / "lab.xlsx", A=[["x"]])
+    with pytest.raises(ReadError, match=r"lab\.xlsx: no sheet with rows of cells"):
+        read(path)
+    path.write_bytes(path.read_bytes()[:-60])
+    with pytest.raises(ReadError, match=r"lab\.xlsx: its Excel content cannot be read \(.*\), .* Save it as CSV"):
+        read(path)
+
+
+def test_a_workbook_without_its_package_says_what_to_install(tmp_path, monkeypatch):
+    def missing(package: str) -> None:
+        raise ImportError(package)
+
+    path = workbook(tmp_path / "lab.xlsx", A=[["theta_i", "theta_o", "brdf"], [30, 20, 0.5]])
+    monkeypatch.setattr(importlib, "import_module", missing)
+    with pytest.raises(FitmatError, match=r"lab\.xlsx: .*or save it as CSV.*pip install 'fitmat\[excel\]'"):
+        read(path)
