@@ -12,8 +12,6 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-import numpy as np
-
 MOST_SHOWN = 1500
 """Characters of what a prompt shows of a result."""
 
@@ -107,6 +105,7 @@ def brief(self: Any) -> str:
     """What a prompt shows of a result: its own words where it has some, else its fields; arrays by their shape.
 
     Example:
+        >>> import numpy as np
         >>> @dataclasses.dataclass(frozen=True, eq=False)
         ... class Curve:
         ...     name: str
@@ -126,6 +125,8 @@ def brief(self: Any) -> str:
 
 def _shown(part: Any) -> str:
     """One field, in a few words."""
+    import numpy as np
+
     if isinstance(part, float | np.floating):
         return f"{part:.4g}"
     if part is None or isinstance(part, bool | int | np.generic):

@@ -82,11 +82,11 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
         {"source": {"theta_i": [1.0], "theta_o": [1.0], "brdf": [1.0]}},
         {
             "source": (None, 5, 1j, [], FIT, {"theta_i": 1.0}),
-            **dict.fromkeys(("quantity", "angle_unit", "where"), TEXT),
+            **dict.fromkeys(("quantity", "angle_unit", "where", "scale", "forward"), TEXT),
             **dict.fromkeys(("intensity", "distance", "panel"), ("much", 1j, [], FIT)),
             "columns": (5, 1j, [], FIT),
-            "forward": (None, *TEXT),
-            "specular_azimuth": (None, "a", 1.5, []),
+            "specular_azimuth": ("a", 1.5, []),
+            "constants": (5, "theta_i=30", [1.0], FIT, {"theta_i": "30"}, {"alpha": 1.0}, {"theta_i": np.nan}),
             "unknown_scale": FLAG,
             "instrument": NOUN,
         },
@@ -270,7 +270,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
 }
 """Public name → arguments that are right, and for each argument what is not."""
 
-UNCHECKED = {"source", "masked", "notes", "channels"}
+UNCHECKED = {"source", "masked", "notes", "warnings", "channels"}
 """What only words are made of; and names of channels, which are looked at once there are values."""
 
 RESULTS = {"Fit", "Posterior", "Match", "Study"}

@@ -20,6 +20,8 @@ from fitmat.measurements.options import Options
 from fitmat.measurements.parsing import cells, contents, frames, tabular
 from fitmat.measurements.parsing.recording import Recording, mask
 from fitmat.measurements.parsing.table import Table, from_arrays
+from fitmat.measurements.peak_side import with_peak_side
+from fitmat.measurements.plausible_values import refuse_implausible
 from fitmat.measurements.quantity import factor, note
 from fitmat.measurements.samples import Measurements
 from fitmat.measurements.scale import of_unknown_scale
@@ -58,19 +60,21 @@ def read(
     columns: str | Mapping[str, str | int] | None = None,
     quantity: str | None = None,
     angle_unit: str | None = None,
-    forward: str = "positive",
-    specular_azimuth: int = 180,
+    forward: str | None = None,
+    specular_azimuth: int | None = None,
     intensity: float | None = None,
     distance: float | None = None,
     where: str | None = None,
     panel: float | None = None,
     unknown_scale: bool = False,
+    scale: str | None = None,
+    constants: Mapping[str, float] | None = None,
     instrument: Instrument = IDEAL,
 ) -> Measurements:
     """Read BRDF measurements from a file, a data frame, an xarray object or a dict of arrays.
 
     Files of `FORMATS` are recognised by their content and say what they hold. Of text tables, Parquet files and the
-    rest the columns are recognised, in any letter case (`fitmat.measurements.parsing.columns.ALIASES` has more names):
+    rest the columns are recognised, in any letter case (`fitmat.measurements.parsing.names.ALIASES` has more names):
 
     - theta_i, theta_o, and phi = φ_o − φ_i or phi_i and phi_o, in degrees; the mirror side is φ = 180.
       Without azimuth, theta_o is signed: positive is forward, the mirror side.
@@ -85,15 +89,21 @@ def read(
         columns: Our name → name or number (from 1) in the file; or as text, "theta_i=Zenith,theta_o=3".
         quantity: What a column called value holds: "brdf", "brdf_cos", "reflectance_factor", "radiance" or
             "panel_ratio".
-        angle_unit: "degrees" or "radians"; None for degrees, refused where the range looks like radians.
-        forward: Sign of theta_o on the mirror side where there is no azimuth: "positive" or "negative".
-        specular_azimuth: Relative azimuth of the mirror side in the file, 180 or 0.
+        angle_unit: "degrees", "radians" or "gon", or of single columns, "phi=radians"; None for degrees, refused where
+            the range looks like radians.
+        forward: Sign of theta_o on the mirror side of a positive theta_i where there is no azimuth: "positive" (the
+            default; asked for where theta_i is negative) or "negative".
+        specular_azimuth: Relative azimuth of the mirror side in the file, 180 (the default) or 0.
         intensity: Of the point source that lit the sample, W/sr, where radiances in W/(m² sr) were read.
         distance: Of that source from the sample, m.
         where: Read only rows in which a column has this value, "material=Alu".
         panel: Reflectance factor of the white panel to which readings were compared.
         unknown_scale: Whether the values are known but for a common factor. They are divided by one that gives a
             typical curve an albedo of about 0.4 (`fitmat.measurements.scale`), and the scale is fitted.
+        scale: How the values and their σ are written: "linear", "percent", "db" (10 log₁₀), "log10" or "ln"; None for
+            linear, refused where they look like percent or logarithms.
+        constants: What is the same in every row and has no column, {"theta_i": 30}: angles in the file's unit, or a
+            wavelength in nm. Comments above the rows, as "# theta_i = 30 deg", are read so too.
         instrument: Apertures, calibration and dark signal of what took them.
 
     Returns:
@@ -108,7 +118,10 @@ def read(
     """
     arguments.kind("columns", columns, str, Mapping, optional=True)
     arguments.kind("instrument", instrument, Instrument)
-    options = Options(quantity, angle_unit, forward, specular_azimuth, intensity, distance, where, panel, unknown_scale)
+    options = Options(
+        *(quantity, angle_unit, forward, specular_azimuth, intensity, distance, where, panel, unknown_scale, scale),
+        constants or {},
+    )
     recording = _recording(source, columns, options)
     found = measured(recording, options)
     if not found.valid.any():
@@ -117,9 +130,11 @@ def read(
         if found.masked.get("at or below the horizon") == found.n_samples:
             expected += f'; where phi is the zenith angle, pass columns="{EXCHANGED}" (--columns)'
         raise ReadError(f"{recording.source}: every row is masked ({listed}), {expected}.")
+    refuse_implausible(found, recording.quantity, options)
     found = dataclasses.replace(
         found, notes=(*found.notes, *_oddities(found, recording.distinct)), instrument=instrument
     )
+    found = with_peak_side(found, recording.unsaid_side)
     return of_unknown_scale(found) if unknown_scale else found
 
 
@@ -175,9 +190,9 @@ def _of_file(
 def _refuse_needless(name: str, layout: str, columns: str | Mapping[str, str | int] | None, options: Options) -> None:
     """Stop where the user says of a file what its format settles."""
     usual = Options()
-    settled = ("quantity", "where", "angle_unit", "forward", "specular_azimuth")
+    settled = ("quantity", "where", "angle_unit", "forward", "specular_azimuth", "scale")
     said = [n for n in settled if getattr(options, n) != getattr(usual, n)]
-    for option in [*(["columns"] if columns else []), *said][:1]:
+    for option in [*(["columns"] if columns else []), *said, *options.constants][:1]:
         expected = f"expected no {option}= (--{option.replace('_', '-')}): the format settles it"
         raise ReadError(f"{name}: a file of the format {layout}, {expected}. Leave it out.")
 

@@ -42,6 +42,7 @@ class Measurements:
         masked: Reason → number of rows masked for it.
         notes: Plain sentences: factors applied, conventions assumed, oddities kept.
         instrument: What the values owe to the instrument that took them.
+        warnings: Plain sentences: what may have been read otherwise than it was meant.
     """
 
     wi: Float[np.ndarray, "n 3"]
@@ -54,6 +55,7 @@ class Measurements:
     masked: dict[str, int] = dataclasses.field(default_factory=dict)
     notes: tuple[str, ...] = ()
     instrument: Instrument = IDEAL
+    warnings: tuple[str, ...] = ()
 
     __repr__ = brief
 
@@ -150,6 +152,7 @@ class Measurements:
             f"incidence {listed}; sigma {'given' if self.sigma is not None else 'not given'}",
         ]
         lines += [f"{count} masked: {reason}" for reason, count in self.masked.items()]
+        lines += [f"WARNING: {warning}" for warning in self.warnings]
         return "\n".join([*lines, *self.notes, *filter(None, [str(self.instrument)])])
 
 

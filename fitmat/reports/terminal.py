@@ -36,7 +36,8 @@ def show(found: Study, report: Path, screen: Console | None = None) -> None:
     _say(out, str(first.measurements))
     _say(out, first.noise.words)
     for warning in found.warnings:
-        _say(out, f"WARNING: {warning}")
+        if warning not in first.measurements.warnings:  # which the measurements have said
+            _say(out, f"WARNING: {warning}")
     if first.n_values > MOST_SAMPLED:
         words = f"More than {MOST_SAMPLED:,} values: intervals from Laplace's approximation, nothing is sampled."
         _say(out, words)

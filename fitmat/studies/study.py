@@ -279,10 +279,10 @@ def judge(
 
 
 def _odd(posteriors: Sequence[Posterior]) -> tuple[str, ...]:
-    """What is odd about the measurements; nothing is said of a file of which only a part is at hand."""
+    """What is odd about the measurements; of a file of which only a part is at hand, what reading it said."""
     fit = posteriors[0].fit
     if fit.n_values > fit.measurements.n_valid:
-        return ()
+        return fit.measurements.warnings
     return warnings(fit.measurements, tilted=any(Tilted.prefix in posterior.fit.name for posterior in posteriors))
 
 

@@ -86,7 +86,7 @@ ODD: dict[str, str] = {
 def test_check_json_is_one_object_without_nan(run: Run, tmp_path: Path, content: str) -> None:
     path = tmp_path / "odd.csv"
     path.write_text(content)
-    ended = run("check", path, "--json")
+    ended = run("check", path, "--json", "--scale", "linear")
     assert (ended.code, ended.err) == (0, "")
     found = strict(ended.out)
     assert found["file"] == "odd.csv"

@@ -216,7 +216,7 @@ def test_odd_rows_are_kept_or_masked_and_counted(run, tmp_path):
 
 LABELLED: dict[str, tuple[str, tuple[str, ...], str]] = {
     "sigma negative": (with_sigma(lambda o: 0.002 * np.sign(o + 75)), ("converged",), "3 masked: sigma missing, infin"),
-    "inadequate": (with_sigma(lambda o: 0.002), ("converged",), "inadequate: lambert is inadequate: it misses the dat"),
+    "inadequate": (with_sigma(lambda o: 0.002), ("converged",), "in doubt: lambert is inadequate: it misses the data"),
     "all zero": (curves(lambda i, o: 0), ("at_bound",), "Noise unknown"),
     "all negative": (curves(lambda i, o: -1 - 0.01 * (o % 3)), ("at_bound", "unidentifiable"), "kept as noise: 51"),
     "rows copied": (curves() + curves()[len(HEAD) :], ("converged",), "or exact copies"),
@@ -230,7 +230,7 @@ LABELLED: dict[str, tuple[str, tuple[str, ...], str]] = {
 def test_hopeless_data_end_in_a_labelled_result(run, tmp_path, content, results, words):
     path = tmp_path / "odd.csv"
     path.write_text(content)
-    ended = run("fit", path, *QUICK)
+    ended = run("fit", path, *QUICK, "--scale", "linear")
     found = json.loads((tmp_path / "odd-fitmat" / "fit.json").read_text())
     assert found["fits"][0]["result"] in results
     assert ended.code == (0 if found["fits"][0]["result"] == "converged" else 3)

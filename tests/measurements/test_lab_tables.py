@@ -85,7 +85,7 @@ def test_each_angle_has_its_own_unit(tmp_path):
     text = f"theta_i [deg],theta_o (°),phi [rad],brdf\n30,45,{np.pi / 2!r},0.5\n"
     found = read(written(tmp_path, text))
     assert np.rad2deg([found.theta_i[0], found.theta_o[0], found.phi[0]]) == pytest.approx([30, 45, 90], abs=1e-9)
-    assert "phi read as radians." in found.notes
+    assert "Angles read: theta_i in degrees, theta_o in degrees, phi in radians." in found.notes
 
 
 def test_units_below_the_header_count_like_those_in_it(tmp_path):
@@ -101,7 +101,14 @@ def test_percentages_are_divided_by_a_hundred(tmp_path, names):
     found = read(path, columns={"reflectance_factor": "R (%)"} if names.startswith("R") else None)
     assert found.value == pytest.approx(0.5 / np.pi, rel=1e-15)
     assert found.sigma == pytest.approx(0.005 / np.pi, rel=1e-15)
-    assert "Values in %, as the header says, divided by 100." in found.notes
+    assert "Values read as percent: divided by 100." in found.notes
+
+
+def test_gon_in_the_header_are_four_hundred_a_turn(tmp_path):
+    """Beside a flag that says the same of another column."""
+    text = f"theta_i [gon],theta_o,phi,brdf\n50,{np.pi / 4!r},90,0.5\n"
+    found = read(written(tmp_path, text), angle_unit="theta_o=radians")
+    assert np.rad2deg([found.theta_i[0], found.theta_o[0], found.phi[0]]) == pytest.approx([45, 45, 90], abs=1e-9)
 
 
 def test_micrometres_are_nanometres(tmp_path):
@@ -116,8 +123,9 @@ def test_micrometres_are_nanometres(tmp_path):
         ("theta_i,theta_o,brdf [%]", {}, r"brdf or its sigma in %, expected brdf in its own unit\. Is it a ref"),
         ("theta_i,theta_o,brf,sigma [%]", {}, r"only sigma \[%\] in %, expected all values alike"),
         ("theta_i,theta_o,brdf,sigma [%]", {}, r"brdf or its sigma in %.*multiply it out"),
-        ("theta_i,theta_o,phi [gon],brdf", {}, r"the column phi \[gon\] is in gon, expected deg or rad\. Convert it"),
-        ("theta_i [mrad],theta_o,brdf", {}, r"the column theta_i \[mrad\] is in mrad, expected deg or rad"),
+        ("theta_i,theta_o,phi [turns],brdf", {}, r"the column phi \[turns\] is in turns, expected deg, rad or gon"),
+        ("theta_i [mrad],theta_o,brdf", {}, r"the column theta_i \[mrad\] is in mrad, expected deg, rad or gon"),
+        ("theta_i,theta_o,brf [%]", {"scale": "db"}, r"the header says %, --scale says db, expected them to agree"),
         ("theta_i,theta_o,wavelength (Å),brdf", {}, r"is in Å, expected nm or µm"),
     ],
 )  # fmt: skip

@@ -11,7 +11,8 @@ import pandas as pd
 import polars as pl
 import pytest
 
-from fitmat.measurements.parsing.columns import ALIASES, Role, role
+from fitmat.errors import ReadError
+from fitmat.measurements.parsing.names import ALIASES, Role, role
 from fitmat.measurements.reader import read
 from fitmat.measurements.samples import Measurements
 
@@ -91,9 +92,9 @@ def test_utf16_big_endian(write):
 
 def test_headerless_file_by_numbers(write):
     columns = {"theta_i": 2, "theta_o": 3, "reflectance_factor": 5, "sigma": "6"}
-    measured = read(write("Alu,30,45,7,3.0,0.1\nAlu,30,-45,7,6.0,0.1\n"), columns=columns)
+    measured = read(write("Alu,30,45,7,0.3,0.1\nAlu,30,-45,7,0.6,0.1\n"), columns=columns)
     assert degrees(measured) == [[30, 45, 180], [30, 45, 0]]
-    assert measured.value[:, 0] == pytest.approx([3 / math.pi, 6 / math.pi], rel=EXACT)
+    assert measured.value[:, 0] == pytest.approx([0.3 / math.pi, 0.6 / math.pi], rel=EXACT)
     assert measured.notes[-1] == "Columns not used: column 1, column 4."
 
 
@@ -148,8 +149,10 @@ def sample(**columns: object) -> dict[str, object]:
         ({"theta_o": [-45.0]}, {}, [30, 45, 0]),
         ({}, {"forward": "negative"}, [30, 45, 0]),
         ({"theta_o": [-45.0]}, {"forward": "negative"}, [30, 45, 180]),
-        ({"theta_i": [-30.0]}, {}, [30, 45, 0]),
-        ({"theta_i": [-30.0], "theta_o": [-45.0]}, {}, [30, 45, 180]),
+        ({"theta_i": [-30.0]}, {"forward": "positive"}, [30, 45, 0]),
+        ({"theta_i": [-30.0]}, {"forward": "negative"}, [30, 45, 180]),
+        ({"theta_i": [-30.0], "theta_o": [-45.0]}, {"forward": "positive"}, [30, 45, 180]),
+        ({"theta_i": [-0.01], "theta_o": [-45.0]}, {}, [0.01, 45, 180]),
         ({"phi": [100.0]}, {}, [30, 45, 100]),
         ({"phi": [100.0], "theta_o": [-45.0]}, {}, [30, 45, 80]),
         ({"phi": [260.0]}, {}, [30, 45, 100]),
@@ -176,6 +179,69 @@ def test_radians():
     measured = read(sample(**angles), angle_unit="radians")
     assert degrees(measured) == [[30, 45, 120]]
     assert "Angles read as radians." in measured.notes
+
+
+@pytest.mark.parametrize(
+    ("columns", "unit", "expected"),
+    [
+        ({"phi": [math.pi / 2]}, "phi=radians", [30, 45, 90]),
+        ({"phi": [3.0]}, "phi=degrees", [30, 45, 3]),
+        ({"phi": [3.0]}, "degrees", [30, 45, 3]),
+        ({"phi_i": [0.0], "phi_o": [math.pi]}, "phi_i=radians, phi_o=radians", [30, 45, 180]),
+        ({"theta_o": [math.pi / 3]}, "theta_o=radians", [30, 60, 180]),
+        ({"theta_i": [20.0], "theta_o": [50.0], "phi": [100.0]}, "gon", [18, 45, 90]),
+        ({"phi": [150.0]}, "phi=gon", [30, 45, 135]),
+    ],
+)
+def test_units_of_single_columns(columns, unit, expected):
+    measured = read(sample(**columns), angle_unit=unit)
+    assert degrees(measured) == [expected]
+
+
+def test_a_full_circle_of_the_sensors_arm():
+    measured = read(sample(theta_i=[30.0, 30.0], theta_o=[340.0, 20.0], brdf=[1.0, 1.0]))
+    assert degrees(measured) == [[30, 20, 0], [30, 20, 180]]
+    assert "theta_o from three quarters of a turn on read as negative: 340° is −20°." in measured.notes
+
+
+def test_elevations_are_counted_from_the_horizon():
+    table = {"Sun elevation": [60.0], "View Elevation Angle": [45.0], "phi": [100.0], "brdf": [1.0]}
+    measured = read(table)
+    assert degrees(measured) == [[30, 45, 100]]
+    assert "theta_i is 90° − elevation_i." in measured.notes
+    mapped = read(sample(height=[60.0], theta_i=[9.0]), columns="elevation_i=height")
+    assert degrees(mapped) == [[30, 45, 180]]
+
+
+def test_constants_stand_for_columns(write):
+    path = write("theta_o,phi,brdf\n45,100,1\n50,100,2\n")
+    measured = read(path, constants={"theta_i": 30.0, "wavelength": 532.0})
+    assert degrees(measured) == [[30, 45, 100], [30, 50, 100]]
+    assert measured.channels == ("532",)
+    assert "theta_i = 30 in every row, as was said." in measured.notes
+    turned = read(
+        {"theta_i": [0.5], "theta_o": [0.7], "brdf": [1.0]}, angle_unit="radians", constants={"phi": math.pi / 2}
+    )
+    assert turned.phi == pytest.approx([math.pi / 2], rel=EXACT)
+
+
+@pytest.mark.parametrize(
+    "comment",
+    ["#intheta 30", "# theta_i = 30 deg", "% Angle of incidence: 30.0°", "// AOI\t30", "; incident angle = +30"],
+)
+def test_an_angle_stated_in_a_comment(write, comment):
+    path = write(f"#datapoints 2\n{comment}\ntheta_o,phi,brdf\n45,100,1\n50,100,2\n")
+    measured = read(path)
+    assert degrees(measured) == [[30, 45, 100], [30, 50, 100]]
+    assert "theta_i = 30 in every row, by the comment in row 2." in measured.notes
+
+
+def test_a_comment_serves_only_what_has_no_column(write):
+    path = write("# theta_i = 10\n# phi_i = 20\n# phi = 5\ntheta_i,theta_o,phi,brdf\n30,45,100,1\n")
+    assert degrees(read(path)) == [[30, 45, 100]]
+    path = write("# theta_i = 10\n# phi_i = 20\n# phi = 5\ntheta_o,phi_o,brdf\n45,100,1\n")
+    assert degrees(read(path)) == [[10, 45, 80]]
+    assert degrees(read(path, constants={"theta_i": 40.0})) == [[40, 45, 80]]
 
 
 def test_small_angles_are_degrees_when_confirmed_or_too_small_to_doubt():
@@ -229,6 +295,37 @@ def test_wide_channels_each_with_its_sigma(write):
     assert measured.value.tolist() == [[1, 2]]
     assert measured.sigma is not None
     assert measured.sigma.tolist() == [[0.1, 0.2]]
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "Incident_angle,Measure_angle,450nm,650.5nm",
+        "AOI,VZA,450 nm,650.5 nm",
+        "theta_i,theta_o,R_450,R_650.5",
+        "theta_i,theta_o,450,650.5",
+        "theta_i,theta_o,450 [nm],650.5 (nm)",
+    ],
+)
+def test_columns_named_by_their_wavelength(write, header):
+    path = write(header + "\n30,45,0.1,0.2\n30,50,0.3,0.4\n")
+    with pytest.raises(ReadError, match=r"the columns (R_)?450.*, (R_)?650\.5.* do not say what they hold"):
+        read(path)
+    measured = read(path, quantity="brdf")
+    assert measured.channels == ("450", "650.5")
+    assert measured.value.tolist() == [[0.1, 0.2], [0.3, 0.4]]
+    assert degrees(measured) == [[30, 45, 180], [30, 50, 180]]
+
+
+def test_a_wavelength_beside_a_quantity_is_no_value(write):
+    measured = read(write("theta_i,theta_o,brdf,550nm,2024\n30,45,0.1,7,8\n"))
+    assert measured.value.tolist() == [[0.1]]
+    assert measured.notes[-1] == "Columns not used: 550nm, 2024."
+
+
+def test_numbers_in_a_header_that_are_no_wavelengths_are_rows(write):
+    measured = read(write("30,45,450\n30,50,550\n"), columns="theta_i=1,theta_o=2,brdf=3")
+    assert measured.value.tolist() == [[450], [550]]
 
 
 def test_one_sigma_serves_all_channels():
@@ -400,6 +497,36 @@ def test_notes_say_what_was_assumed():
 @pytest.mark.parametrize(("kind", "alias"), [(kind, alias) for kind in ALIASES for alias in (kind, *ALIASES[kind])])
 def test_documented_aliases(kind, alias):
     assert role(f" {alias.upper()} ") == Role(kind)
+
+
+@pytest.mark.parametrize(
+    ("names", "kind"),
+    [
+        ("Incident_angle, incident-angle, IncidentAngle, AOI, SZA, Solar Zenith Angle, thetaI, Theta_In", "theta_i"),
+        (
+            "Measure_angle, measurement angle, VZA, view-zenith, ViewZenithAngle, theta_r, ThetaR, scatter angle",
+            "theta_o",
+        ),
+        ("RAA, Relative Azimuth, relAzimuth, Relative_Azimuth_Angle, dphi", "phi"),
+        ("SAA, solar azimuth angle", "phi_i"),
+        ("VAA, Sensor Azimuth", "phi_o"),
+        ("BRF", "reflectance_factor"),
+    ],
+)
+def test_names_of_instruments_and_satellites(names, kind):
+    assert {role(name) for name in names.split(", ")} == {Role(kind)}
+
+
+@pytest.mark.parametrize("name", ["zenith", "azimuth", "angle", "theta", "elevation", "scattering angle", "R"])
+def test_names_of_several_meanings_are_not_guessed(name):
+    assert role(name) is None
+
+
+def test_azimuths_of_sun_and_sensor_are_subtracted():
+    table = {"SZA": [30.0], "VZA": [45.0], "SAA": [150.0], "VAA": [290.0], "BRF": [math.pi]}
+    measured = read(table)
+    assert degrees(measured) == [[30, 45, 140]]
+    assert measured.value[0, 0] == pytest.approx(1, rel=EXACT)
 
 
 @pytest.mark.parametrize(

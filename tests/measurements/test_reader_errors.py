@@ -52,9 +52,30 @@ BAD_FILES: dict[str, tuple[str | bytes, str]] = {
         HEAD + "0.5,1.5,1\n0,-1.6,1\n",
         "exceeds 1.6, .*--angle-unit radians or --angle-unit deg",
     ),
+    "perhaps an azimuth in radians": (
+        "phi," + HEAD + "0,30,45,1\n3.14159,30,45,1\n",
+        "no azimuth exceeds 3.14159, .* Confirm with --angle-unit phi=radians or --angle-unit phi=degrees",
+    ),
+    "perhaps azimuths in radians": (
+        "phi_i,phi_o," + HEAD + "0,-1.5708,30,45,1\n",
+        "no azimuth exceeds 1.5708, .* --angle-unit phi_i=radians,phi_o=radians or --angle-unit phi_i=degrees,phi_o=",
+    ),
+    "perhaps one zenith in radians": (
+        HEAD + "30,-1.2,1\n30,0,1\n30,1.2,1\n",
+        "no theta_o exceeds 1.2, expected degrees as of the other zenith angle; .*--angle-unit theta_o=radians or",
+    ),
+    "comments that contradict each other": (
+        "# theta_i = 30\ntheta_o,brdf\n1,2\n# theta_i = 60\n1,2\n",
+        r"comments state theta_i = 30 in row 1 and 60 in row 4, expected one for the file\. Give it a column, or split",
+    ),
+    "elevation beside zenith": (also("elevation_i", "60"), "theta_i and elevation_i, expected one: elevation_i is 90°"),
+    "below the horizon": (
+        "elevation_i,theta_o,brdf\n91,45,1\n",
+        "row 2: elevation_i = 91, expected −90 to 90 degrees",
+    ),
     "foreign columns": (
         "Zenith,Azimuth,I\n1,2,3\n",
-        r"the columns are Zenith, Azimuth, I, expected theta_i \(or .*aoi\) and theta_o .*columns=\"theta_i",
+        r"the columns are Zenith, Azimuth, I, expected theta_i \(or .*aoi, .*…\) and theta_o .*columns=\"theta_i",
     ),
     "a name that means empty": (
         "theta_i,theta_o,brdf,NA\n20,20,0.5,1\n",
@@ -62,13 +83,17 @@ BAD_FILES: dict[str, tuple[str | bytes, str]] = {
     ),
     "a dash as a name": ("#\ntheta_i;-;theta_o\n20;1;20\n", r"row 2: column 2 is named -, which means empty"),
     "no header": ("30,45,0.5\n", "no header line and 3 columns, expected theta_i"),
-    "no theta_o": ("theta_i,brdf\n30,0.5\n", r"the columns are theta_i, brdf, expected theta_o \(or thetao"),
+    "no theta_o": ("theta_i,brdf\n30,0.5\n", r"the columns are theta_i, brdf, expected theta_o \(or theta_out, .* …\)"),
     "no quantity": ("theta_i,theta_o,I\n30,45,1\n", "expected a measured quantity: brdf, brdf_cos, refl"),
     "unsaid quantity": (VALUE, "value does not say what it holds.*refuses to guess: pass quantity="),
     "two quantities": (also("brf", "1"), "brdf and reflectance_factor at once, expected one"),
     "phi twice over": (
         also("phi,phi_i,phi_o", "1,2,3"),
         "phi and phi_i and phi_o, expected phi, or phi_i and phi_o",
+    ),
+    "light on a signed axis": (
+        "theta_i,theta_o,brdf\n-20,20,0.5\n",
+        r"row 2: theta_i = -20, expected .* pass --forward negative if that of theta_i = −20 is theta_o = 20, --forw",
     ),
     "phi_o alone": (also("phi_o", "1"), r"phi_o alone, expected phi_i.*columns=\"phi=phi_o\""),
     "duplicate names": (also("brdf", "1"), r"columns 1 and 4 \(brdf, brdf\) are both brdf"),
@@ -117,6 +142,38 @@ BAD_OPTIONS: dict[str, tuple[str, dict[str, Any], str]] = {
         r"distance = 0 \(--distance\), expected a pos",
     ),
     "angle unit": (GOOD, {"angle_unit": "grad"}, r"angle_unit = 'grad' \(--angle-unit\), expected 'degrees'"),
+    "angle unit of a column": (
+        GOOD,
+        {"angle_unit": "phi=rad"},
+        "angle_unit = 'phi=rad' .*'phi=radians,theta_o=degrees'",
+    ),
+    "angle unit of no column": (
+        GOOD,
+        {"angle_unit": "phi=gon"},
+        "angle_unit names phi .*expected one of .*theta_i, the",
+    ),
+    "constant beside its column": (
+        GOOD,
+        {"constants": {"theta_i": 30}},
+        r"theta_i = 30 \(--theta-i\) beside a column of that meaning, theta_i, expected one of them",
+    ),
+    "constant beside a mapped column": (
+        "1,2,3\n",
+        {"columns": "theta_i=1,theta_o=2,brdf=3", "constants": {"theta_o": 5}},
+        r"theta_o = 5 \(--theta-o\) beside a column of that meaning, column 2",
+    ),
+    "constant beside an alias": ("AOI,VZA,BRF\n1,2,3\n", {"constants": {"theta_i": 5}}, "that meaning, AOI, expected"),
+    "unknown constant": (GOOD, {"constants": {"gloss": 3}}, r"gloss = 3 \(--gloss\), expected one of theta_i, theta_o"),
+    "constant of no value": (
+        "theta_o,brdf\n1,2\n",
+        {"constants": {"theta_i": float("nan")}},
+        "theta_i = nan .*expected a number",
+    ),
+    "constant out of range": (
+        "theta_o,brdf\n1,2\n",
+        {"constants": {"theta_i": 200}},
+        "theta_i = 200.0, expected −180 to 180",
+    ),
     "forward": (GOOD, {"forward": "up"}, "forward = 'up' .*expected 'positive' or 'negative'"),
     "specular azimuth": (GOOD, {"specular_azimuth": 90}, "specular_azimuth = 90 .*expected 180 or 0"),
     "quantity denied": (
@@ -247,6 +304,8 @@ NEEDLESS: dict[str, tuple[dict[str, Any], str]] = {
         {"specular_azimuth": 0},
         r"no specular_azimuth= \(--specular-azimuth\): the format settles it",
     ),
+    "scale": ({"scale": "db"}, r"no scale= \(--scale\): the format settles it"),
+    "constants": ({"constants": {"theta_i": 30.0}}, r"no theta_i= \(--theta-i\): the format settles it"),
     "panel": ({"panel": 0.99}, r"panel = 0\.99 \(--panel\), expected none: the values are brdf"),
     "source": ({"intensity": 1.0, "distance": 2.0}, r"\(--intensity, --distance\), expected none: the values are brdf"),
     "calibration": (

@@ -18,8 +18,8 @@ def _source(file: Path) -> Path:
 FileFlag = Annotated[
     Path,
     typer.Argument(
-        help="Measurements: CSV or any text table (also .gz), Parquet, Excel, MERL, RGL, Zemax, LightTools, FRED, ASTM, "
-        "UTIA, ALTA, SSDD; - for standard input.",
+        help="Measurements: CSV or any text table (also .gz), Parquet, Excel, MERL, RGL, Zemax, LightTools, FRED, "
+        "ASTM, UTIA, ALTA, SSDD; - for standard input.",
         callback=_source,
     ),
 ]

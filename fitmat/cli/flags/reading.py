@@ -10,6 +10,16 @@ import typer
 FILE, INSTRUMENT = "What the file does not say", "The instrument"
 """Headings in the help."""
 
+
+def _constant(what: str) -> Any:
+    return typer.Option(
+        help=f"{what} where it is the same in every row and has no column.",
+        metavar="X",
+        show_default=False,
+        rich_help_panel=FILE,
+    )
+
+
 ColumnsFlag = Annotated[
     str | None,
     typer.Option(
@@ -34,7 +44,7 @@ QuantityFlag = Annotated[
 AngleUnitFlag = Annotated[
     str | None,
     typer.Option(
-        help="Unit of the angles: degrees (default) or radians.",
+        help="Unit of the angles: degrees (default), radians or gon; or of single columns: phi=radians.",
         metavar="UNIT",
         show_default=False,
         rich_help_panel=FILE,
@@ -42,18 +52,23 @@ AngleUnitFlag = Annotated[
 ]
 
 ForwardFlag = Annotated[
-    str,
+    str | None,
     typer.Option(
-        help="Sign of theta_o on the mirror side, in files without azimuth: positive or negative.",
+        help="Sign of theta_o on the mirror side of a positive theta_i, in files without azimuth: positive (default) "
+        "or negative.",
         metavar="SIGN",
+        show_default=False,
         rich_help_panel=FILE,
     ),
 ]
 
 SpecularAzimuthFlag = Annotated[
-    int,
+    int | None,
     typer.Option(
-        help="Relative azimuth phi of the mirror side in the file: 180 or 0.", metavar="PHI", rich_help_panel=FILE
+        help="Relative azimuth phi of the mirror side in the file: 180 (default) or 0.",
+        metavar="PHI",
+        show_default=False,
+        rich_help_panel=FILE,
     ),
 ]
 
@@ -76,6 +91,23 @@ DistanceFlag = Annotated[
         rich_help_panel=FILE,
     ),
 ]
+
+ScaleFlag = Annotated[
+    str | None,
+    typer.Option(
+        help="How the values are written: linear (default), percent, or as logarithms: db, log10, ln.",
+        metavar="HOW",
+        show_default=False,
+        rich_help_panel=FILE,
+    ),
+]
+
+ThetaIFlag = Annotated[float | None, _constant("theta_i, in degrees,")]
+ThetaOFlag = Annotated[float | None, _constant("theta_o, in degrees,")]
+PhiFlag = Annotated[float | None, _constant("phi, in degrees,")]
+PhiIFlag = Annotated[float | None, _constant("phi_i, in degrees,")]
+PhiOFlag = Annotated[float | None, _constant("phi_o, in degrees,")]
+WavelengthFlag = Annotated[float | None, _constant("The wavelength, in nm,")]
 
 WhereFlag = Annotated[
     str | None,
@@ -112,13 +144,22 @@ def reading(
     columns: ColumnsFlag = None,
     quantity: QuantityFlag = None,
     angle_unit: AngleUnitFlag = None,
-    forward: ForwardFlag = "positive",
-    specular_azimuth: SpecularAzimuthFlag = 180,
+    forward: ForwardFlag = None,
+    specular_azimuth: SpecularAzimuthFlag = None,
     intensity: IntensityFlag = None,
     distance: DistanceFlag = None,
     where: WhereFlag = None,
     panel: PanelFlag = None,
     unknown_scale: UnknownScaleFlag = False,
+    scale: ScaleFlag = None,
+    theta_i: ThetaIFlag = None,
+    theta_o: ThetaOFlag = None,
+    phi: PhiFlag = None,
+    phi_i: PhiIFlag = None,
+    phi_o: PhiOFlag = None,
+    wavelength: WavelengthFlag = None,
 ) -> dict[str, Any]:
     """What the flags say of a file, as arguments of `fitmat.read`."""
-    return dict(locals())
+    said = dict(locals())
+    constants = {name: said.pop(name) for name in ("theta_i", "theta_o", "phi", "phi_i", "phi_o", "wavelength")}
+    return said | {"constants": {name: number for name, number in constants.items() if number is not None}}

@@ -31,7 +31,7 @@ def title(m: Measurements) -> Said:
     lines += [f"Not used, {reason}: {say.count(count, 'row')}." for reason, count in m.masked.items()]
     empty = [name for name, used in zip(m.channels, m.valid.T, strict=True) if not used.any()]
     warnings = [f"Nothing can be used of {say.channels(empty)}: every value is masked."] if empty else []
-    return Said(warnings, [*lines, *m.notes])
+    return Said([*warnings, *m.warnings], [*lines, *m.notes])
 
 
 def geometry(where: Coverage) -> Said:

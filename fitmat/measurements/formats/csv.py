@@ -10,7 +10,7 @@ from jaxtyping import Shaped
 
 from fitmat.errors import OutputError, ReadError
 from fitmat.measurements.parsing import cells, contents
-from fitmat.measurements.parsing.columns import Role, role
+from fitmat.measurements.parsing.names import Role, role
 from fitmat.measurements.samples import Measurements, default_channels
 from fitmat.text import visible
 
@@ -36,7 +36,9 @@ def columns(measurements: Measurements) -> dict[str, Shaped[np.ndarray, " n"]]:
     numbers = {kind: np.where(m.valid, number, np.nan) for kind, number in numbers.items()}
     if names == default_channels(1):
         return angles | {kind: number[:, 0] for kind, number in numbers.items()}
-    known = all(role(f"{kind}_{name}") == Role(kind, name) for kind in ("brdf", "sigma") for name in names)
+    known = all(names) and all(
+        role(f"{kind}_{name}") == Role(kind, name) for kind in ("brdf", "sigma") for name in names
+    )
     if known and len(set(names)) == len(names):
         wide = ((kind, k) for kind in numbers for k in range(len(names)))
         return angles | {f"{kind}_{names[k]}": numbers[kind][:, k] for kind, k in wide}

@@ -81,21 +81,31 @@ def _without_panics() -> Iterator[None]:
     """Hold back what compiled code prints on stderr, and print it afterwards unless a thread panicked."""
     with contextlib.ExitStack() as held:
         try:
-            printed = held.enter_context(tempfile.TemporaryFile())
+            printed = _memory()
+            held.callback(os.close, printed)
             before = os.dup(_STDERR)
         except OSError:  # no room, or no stderr
             yield
             return
-        os.dup2(printed.fileno(), _STDERR)
+        os.dup2(printed, _STDERR)
         try:
             yield
         finally:
             os.dup2(before, _STDERR)
             os.close(before)
-            printed.seek(0)
-            if _PANIC not in (said := printed.read()):
+            size = os.lseek(printed, 0, os.SEEK_END)
+            os.lseek(printed, 0, os.SEEK_SET)
+            if _PANIC not in (said := os.read(printed, size)):
                 with contextlib.suppress(OSError):
                     os.write(_STDERR, said)
+
+
+def _memory() -> int:
+    """The descriptor of a new file without a name, in memory where the system has that."""
+    if hasattr(os, "memfd_create"):
+        return os.memfd_create("fitmat")
+    with tempfile.TemporaryFile() as file:
+        return os.dup(file.fileno())
 
 
 def dump(measurements: Measurements) -> bytes:

@@ -20,9 +20,13 @@ from fitmat.measurements.large.first_pass import FirstPass, joined_rows, magnitu
 from fitmat.measurements.large.stream import CHUNK, PART, is_kept
 from fitmat.measurements.options import Options
 from fitmat.measurements.parsing import contents, tabular
-from fitmat.measurements.parsing.columns import assign
+from fitmat.measurements.parsing.angles import as_stated
+from fitmat.measurements.parsing.columns import Columns, assign
+from fitmat.measurements.parsing.constants import with_constants
 from fitmat.measurements.parsing.recording import Recording, named
 from fitmat.measurements.parsing.table import Table
+from fitmat.measurements.peak_side import with_peak_side
+from fitmat.measurements.plausible_values import refuse_implausible
 from fitmat.measurements.reader import FORMATS, measured
 from fitmat.measurements.samples import Measurements
 from fitmat.measurements.scale import of_unknown_scale
@@ -109,21 +113,28 @@ def scan(
         ReadError: as `fitmat.read`; also where channels are rows, because a geometry's rows may lie in two chunks.
     """
     options = Options(**conventions)
-    # One chunk may hold small angles only; whether all do is asked at the end. Rows are chosen here.
-    lenient = dataclasses.replace(options, doubtful=False, where=None)
+    lenient = whole = dataclasses.replace(options, where=None)  # rows are chosen here
     look = FirstPass(part)
     for table in _chosen(path, rows, options.where):
-        _refuse_long(table, columns, options)
-        look.add(tabular.recording(table, columns, lenient), table)
+        whole_table = with_constants(table, columns, options.constants)
+        layout = assign(whole_table, columns, options.quantity)
+        _refuse_long(table, layout)
+        # One chunk may hold small angles only; whether all do is asked at the end.
+        stated = as_stated(whole_table, layout.angles, whole)
+        lenient = stated.with_units({name: stated.unit(name) or "degrees" for name in layout.angles})
+        angles = {name: column for name, column in layout.angles.items() if column < len(table.names)}
+        look.add(tabular.recording(table, columns, lenient), table, angles)
         if progress is not None:
             progress("reading", look.n_samples, 0)
-    if look.widest is not None:
-        tabular.recording(look.widest, columns, dataclasses.replace(options, where=None))
+    if look.extremes is not None:
+        tabular.recording(look.extremes, columns, whole)
     if not look.n_valid:
         listed = ", ".join(f"{count} {reason}" for reason, count in look.masked.items()) or "none chosen"
         expected = "expected at least one value that can be used. Check the columns and units"
         raise ReadError(f"{contents.name(path)}: every row is masked ({listed}), {expected}.")
     raw = dataclasses.replace(_part(look, lenient), instrument=instrument)
+    refuse_implausible(raw, look.kept[0].quantity, options)
+    raw = with_peak_side(raw, look.kept[0].unsaid_side)
     shown = of_unknown_scale(raw) if options.unknown_scale else raw
     top = int(np.argmax(raw.value))
     return Chunks(
@@ -162,8 +173,8 @@ def _divided(m: Measurements, factor: float) -> Measurements:
     return dataclasses.replace(m, value=m.value / factor, sigma=sigma)
 
 
-def _refuse_long(table: Table, columns: str | Mapping[str, str | int] | None, options: Options) -> None:
-    if named := {"wavelength", "channel"} & assign(table, columns, options.quantity).marks.keys():
+def _refuse_long(table: Table, layout: Columns) -> None:
+    if named := {"wavelength", "channel"} & layout.marks.keys():
         got = f"a column {named.pop()}, one row for each channel"
         raise ReadError(f"{table.source}: {got}, expected one column for each in so large a file. Pivot the table.")
 

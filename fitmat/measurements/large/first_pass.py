@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import polars as pl
 from jaxtyping import Bool, Int
 
 from fitmat.measurements.large.stream import is_kept
@@ -23,33 +24,46 @@ class FirstPass:
         n_samples: Rows seen.
         notes: Of all recordings.
         thinning: One row in so many is kept.
-        widest: The row with the largest zenith angle.
         kept: The rows kept.
     """
 
     def __init__(self, most: int) -> None:
         self.notes = dict[str, None]()
         self.n_samples, self.thinning = 0, 1
-        self.widest: Table | None = None
         self.kept: list[Recording] = []
-        self._most, self._index, self._lowest = most, list[np.ndarray](), np.inf
+        self._most, self._index = most, list[np.ndarray]()
+        self._extremes = dict[tuple[str, bool], tuple[float, Table]]()
         self._counts, self._valid, self._negative = Counter[str](), 0, _Negatives()
 
-    def add(self, recording: Recording, table: Table) -> None:
-        """Count a chunk's rows and keep some of them."""
+    def add(self, recording: Recording, table: Table, angles: Mapping[str, int]) -> None:
+        """Count a chunk's rows and keep some of them; `angles` are the columns that hold any."""
         valid, masked = mask(magnitudes(recording, {}))
         self.notes |= dict.fromkeys(recording.notes)
         self._counts.update(masked)
         self._valid += int(np.count_nonzero(valid))
         self._negative = self._negative.with_those(recording.value, valid)
-        heights = np.nan_to_num(np.minimum(recording.wi[:, 2], recording.wo[:, 2]), nan=np.inf)
-        if heights.min() < self._lowest:
-            row = int(heights.argmin())
-            self._lowest = float(heights[row])
-            cells, lines = table.cells.slice(row, 1), table.lines[row : row + 1]
-            self.widest = dataclasses.replace(table, cells=cells, lines=lines)
-        self._keep(np.arange(self.n_samples, self.n_samples + len(heights)), recording)
-        self.n_samples += len(heights)
+        for name, column in angles.items():
+            self._reach(name, table, table.numbers(column))
+        self._keep(np.arange(self.n_samples, self.n_samples + len(valid)), recording)
+        self.n_samples += len(valid)
+
+    def _reach(self, name: str, table: Table, angle: np.ndarray) -> None:
+        for highest in (False, True):
+            size = np.nan_to_num(angle if highest else -angle, nan=-np.inf)
+            row = int(size.argmax())
+            if size[row] > self._extremes.get((name, highest), (-np.inf, table))[0]:
+                cells, lines = table.cells.slice(row, 1), table.lines[row : row + 1]
+                found = dataclasses.replace(table, cells=cells, lines=lines)
+                self._extremes[name, highest] = float(size[row]), found
+
+    @property
+    def extremes(self) -> Table | None:
+        """The rows with the smallest and the largest of each angle; None where there is no angle."""
+        rows = [row for _, row in self._extremes.values()]
+        if not rows:
+            return None
+        cells = pl.concat([row.cells for row in rows], how="vertical_relaxed")
+        return dataclasses.replace(rows[0], cells=cells, lines=np.concatenate([row.lines for row in rows]))
 
     def _keep(self, index: Int[np.ndarray, " n"], recording: Recording) -> None:
         self.kept.append(recording)
@@ -136,8 +150,13 @@ def joined_rows(recordings: Sequence[Recording]) -> Recording:
         wo=along(lambda r: r.wo),
         value=along(lambda r: r.value),
         sigma=None if first.sigma is None else along(lambda r: r.sigma),
-        doubts={reason: along(lambda r, key=reason: r.doubts[key]) for reason in first.doubts},
+        doubts={reason: along(lambda r, key=reason: _doubt(r, key)) for r in recordings for reason in r.doubts},
     )
+
+
+def _doubt(recording: Recording, reason: str) -> Bool[np.ndarray, "n c"]:
+    """Where a recording has a doubt that others of its file have."""
+    return recording.doubts.get(reason, np.zeros(recording.value.shape, bool))
 
 
 def magnitudes(recording: Recording, doubts: Mapping[str, np.ndarray]) -> Recording:

@@ -192,7 +192,8 @@ def _thorough(block: bytes, layout: _Layout, first: int) -> Iterator[Table]:
     content, notes = contents.decoded(layout.prelude + block, head.source)
     table = cells.parse(content, head.source, notes, above=first - above - 1)
     cells.refuse_other_commas(table, head)
-    table = dataclasses.replace(table, names=head.names)
+    stated = (*head.stated, *(comment for comment in table.stated if comment[2] >= first))
+    table = dataclasses.replace(table, names=head.names, stated=stated)
     if table.cells.width != len(head.names):
         got = f"{table.cells.width} cells, expected {len(head.names)} as in row {head.lines[0]}"
         raise ReadError(f"{table.source} row {table.lines[0]}: {got}. Correct the line, or put # before it.")

@@ -12,6 +12,7 @@ import polars as pl
 from fitmat.errors import ReadError
 from fitmat.measurements.parsing import contents, units
 from fitmat.measurements.parsing.table import ERROR_VALUES, MISSING, Table
+from fitmat.measurements.parsing.wavelengths import wavelength
 
 WIDEST = 4096
 """A table of more columns is refused; those of spectrometers have up to 2,000 channels."""
@@ -19,6 +20,7 @@ WIDEST = 4096
 _SPACED = re.compile(r"\d\s+[-+.]?\d")
 _COMMENT = r"^\s*(#|%|//)"
 _ERROR_VALUE = rf"(?i)^\s*({'|'.join(map(re.escape, ERROR_VALUES))})\s*([,;\t]|[-+.\d#]|$)"
+_STATED = r"(?i)^\s*[#%;/]+\s*(\pL[^=:\d]*?)\s*[=:\s]\s*([-+]?\d+(?:\.\d*)?)\s*(?:°|deg|degrees?)?\s*$"
 _SEMICOLON = r"^\s*;"
 _BLANK = r"^[\s,;]*$"
 _QUOTED = r'"[^"]*"'
@@ -57,7 +59,7 @@ def parse(text: str, source: str, notes: tuple[str, ...], above: int = 0) -> Tab
     before = comments.filter((comments["line"] < rows["line"][0]) & comments["text"].str.contains(r"\pL"))
     names = tuple(cells.row(0))
     _refuse_missing_names(names, source, int(rows["line"][0]))
-    if any(_is_number(cell) for cell in names):
+    if any(_is_number(cell) for cell in names) and not _names_wavelengths(cells):
         names = _commented(before["text"].tail(1).to_list(), delimiter, cells.width)
     else:
         rows, cells = rows.slice(1), cells.slice(1)
@@ -68,7 +70,8 @@ def parse(text: str, source: str, notes: tuple[str, ...], above: int = 0) -> Tab
     if cells.is_empty():
         expected = "expected rows of numbers below it. Is the file complete?"
         raise ReadError(f"{source}: a header and no rows ({contents.listed(names)}), {expected}")
-    table = Table(source, names, cells, rows["line"].to_numpy(), (*notes, *told))
+    stated = _stated(comments)
+    table = Table(source, names, cells, rows["line"].to_numpy(), (*notes, *told), stated)
     if delimiter == ",":
         table = _without_thousands(table)
     _refuse_mixed_decimals(table)
@@ -81,9 +84,10 @@ def _laid_out(lines: pl.DataFrame) -> tuple[pl.DataFrame, pl.DataFrame, str | No
     given = _SEPARATOR.match(lines["text"][0]) if len(lines) else None
     if given:
         lines, comment = lines.slice(1), comment.slice(1)
-    delimiter, above = _delimiter_and_notes(lines.filter(~comment)["text"].head(_NOTES).to_list(), given)
-    if delimiter != ";":
+    sample = lines.filter(~comment)["text"].head(_SAMPLE).to_list()
+    if (given[1] if given else _delimiter(sample)) != ";":
         comment |= lines["text"].str.contains(_SEMICOLON)
+    delimiter, above = _delimiter_and_notes(lines.filter(~comment)["text"].head(_NOTES).to_list(), given)
     rows = lines.filter(~comment)
     if not above:
         return rows, lines.filter(comment), delimiter, ()
@@ -170,6 +174,22 @@ def _refuse_missing_names(names: tuple[str, ...], source: str, line: int) -> Non
 
 def _is_number(cell: str) -> bool:
     return bool(_NUMBER.fullmatch(cell)) or cell.lower() in MISSING[1:]
+
+
+def _stated(comments: pl.DataFrame) -> tuple[tuple[str, float, int], ...]:
+    """Name, number and line of the comments that state a number by name."""
+    parts = comments["text"].str.extract_groups(_STATED).struct.unnest()
+    known = parts.with_columns(comments["line"]).drop_nulls()
+    return tuple((str(name).strip(), float(number), int(line)) for name, number, line in known.rows())
+
+
+def _names_wavelengths(cells: pl.DataFrame) -> bool:
+    """Whether the first row is a header in which bare numbers are wavelengths: words in it stand above numbers."""
+    first, second = cells.row(0), cells.row(min(1, cells.height - 1))
+    words = [not _is_number(cell) and cell != "" for cell in first]
+    above = [_is_number(below) for below, word in zip(second, words, strict=True) if word]
+    numbers = [cell for cell, word in zip(first, words, strict=True) if not word]
+    return bool(above) and all(above) and all(wavelength(cell) for cell in numbers)
 
 
 def _commented(comments: list[str], delimiter: str | None, width: int) -> tuple[str, ...]:

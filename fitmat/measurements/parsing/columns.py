@@ -4,58 +4,19 @@ A column that could be two things, or two columns that could be one, are refused
 """
 
 import dataclasses
-import re
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
 
 from fitmat.errors import ReadError
+from fitmat.measurements.options import ANGLES, ELEVATIONS
 from fitmat.measurements.parsing import units
 from fitmat.measurements.parsing.contents import listed, shown
+from fitmat.measurements.parsing.names import ALIASES, BESIDE, VALUES, Role, role, roles_of
 from fitmat.measurements.parsing.table import Table
 from fitmat.measurements.quantity import QUANTITIES
 
-ALIASES = {
-    "theta_i": ("thetai", "theta_in", "theta_inc", "zenith_i", "incidence_angle", "angle_of_incidence", "aoi"),
-    "theta_o": ("thetao", "theta_out", "theta_r", "thetar", "zenith_o"),
-    "phi": ("dphi", "delta_phi", "phi_rel", "relative_azimuth"),
-    "phi_i": ("phii", "phi_in", "phi_inc", "azimuth_i"),
-    "phi_o": ("phio", "phi_out", "phi_r", "phir", "azimuth_o"),
-    "brdf": ("f_r", "fr", "bsdf"),
-    "brdf_cos": ("ccbrdf", "ccbsdf"),
-    "reflectance_factor": ("brf",),
-    "radiance": (),
-    "panel_ratio": ("ratio",),
-    "signal": ("reading", "counts"),
-    "reference": ("reference_signal", "white", "panel"),
-    "value": (),
-    "sigma": ("std", "brdf_sigma", "brdf_std"),
-    "sigma_reference": (),
-    "wavelength": ("wavelength_nm", "lambda", "lambda_nm"),
-    "channel": ("band",),
-    "valid": (),
-    "invalid": ("flag",),
-}
-"""Our name → its aliases; letter case, spaces, hyphens, Greek letters and units behind it do not matter."""
-
-VALUES = (*QUANTITIES, "signal", "value")
 EXAMPLE = 'columns="theta_i=Zenith,theta_o=3" (--columns)'
 
-_ANGLES = ("theta_i", "theta_o", "phi", "phi_i", "phi_o")
-_BESIDE = ("sigma", "reference", "sigma_reference")
-_KINDS = {alias: kind for kind, others in ALIASES.items() for alias in (kind, *others)}
-_GREEK = str.maketrans({"θ": "theta", "ϑ": "theta", "φ": "phi", "ϕ": "phi", "λ": "lambda", "σ": "sigma"})
-_CHANNELS = {"red": "r", "green": "g", "blue": "b"} | {name: name for name in "rgbxyz"}
-_RIVALS = (VALUES, ("wavelength", "channel"), ("phi", "phi_i"), ("phi", "phi_o"), ("sigma",))
-
-
-class Role(NamedTuple):
-    """What a column holds: one of `ALIASES`, and the channel of a value or sigma ("" where it has none)."""
-
-    kind: str
-    channel: str = ""
-
-    def __str__(self) -> str:
-        return "_".join(filter(None, self))
+_RIVALS = (VALUES, *ELEVATIONS.items(), ("wavelength", "channel"), ("phi", "phi_i"), ("phi", "phi_o"), ("sigma",))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,43 +50,28 @@ def assign(table: Table, columns: str | Mapping[str, str | int] | None, quantity
     Raises:
         ReadError: a column is unknown, missing, there twice, or does not say what it holds.
     """
-    said = _said(table, columns)
-    roles = said | _recognised(table, said)
-    angles = {k: roles[Role(k)] for k in _ANGLES if Role(k) in roles}
+    found = roles(table, columns)
+    angles = {k: found[Role(k)] for k in ANGLES if Role(k) in found}
     _refuse_angles(table, angles)
-    kind, quantity = _quantity(table, roles, quantity)
-    values = {role.channel: column for role, column in roles.items() if role.kind == kind}
-    marks = {k: roles[Role(k)] for k in ("valid", "invalid", "wavelength", "channel") if Role(k) in roles}
+    kind, quantity = _quantity(table, found, quantity)
+    values = {role.channel: column for role, column in found.items() if role.kind == kind}
+    marks = {k: found[Role(k)] for k in ("valid", "invalid", "wavelength", "channel") if Role(k) in found}
     if len(values) > 1 and "" in values:
         raise ReadError(f"{table.source}: {kind} and {kind}_… columns, expected one kind. {_choose(kind)}")
     if len(marks.keys() & {"wavelength", "channel"}) + any(values) > 1:
         expected = "expected one channel per column, or one wavelength or channel column"
         raise ReadError(f"{table.source}: channels named in two ways, {expected}. Remove one of them.")
-    sigmas, references, spreads = (_beside(table, kind, roles, values) for kind in _BESIDE)
+    sigmas, references, spreads = (_beside(table, kind, found, values) for kind in BESIDE)
     _refuse_unreferenced(table, quantity, references)
     used = {c for group in (angles, values, sigmas, references, spreads, marks) for c in group.values()}
     unused = tuple(table.label(c) for c in range(len(table.names)) if c not in used)
     return Columns(angles, values, sigmas, references, spreads, marks, quantity, unused)
 
 
-def role(name: str, *, any_channel: bool = False) -> Role | None:
-    """What a header name stands for, None where it is foreign; channels: r, g, b, x, y, z or a number (nm).
-
-    Example:
-        >>> role("BRDF_550nm")
-        Role(kind='brdf', channel='550')
-    """
-    plain = units.split(" ".join(name.split()))[0].lower().translate(_GREEK).strip()
-    plain = re.sub(r"[\s\-_]+", "_", plain)
-    if plain in _KINDS:
-        return Role(_KINDS[plain])
-    stem, _, channel = plain.rpartition("_")
-    kind = _KINDS.get(stem)
-    if kind not in (*VALUES, *_BESIDE):
-        return None
-    number = re.fullmatch(r"(\d+(?:\.\d+)?)(nm)?", channel)
-    known = number[1] if number else _CHANNELS.get(channel, channel if any_channel else "")
-    return Role(kind, known) if known else None
+def roles(table: Table, columns: str | Mapping[str, str | int] | None) -> dict[Role, int]:
+    """What each column holds, by the user's word, then by the header; positions from 0."""
+    said = _said(table, columns)
+    return said | _recognised(table, said)
 
 
 def _said(table: Table, columns: str | Mapping[str, str | int] | None) -> dict[Role, int]:
@@ -179,10 +125,9 @@ def _recognised(table: Table, said: Mapping[Role, int]) -> dict[Role, int]:
     kinds = {mine.kind for mine in said}
     replaced = {rival for group in _RIVALS if kinds & {*group} for rival in group}
     found: dict[Role, int] = {}
-    for column, name in enumerate(table.names):
-        mine = role(name)
+    for column, mine in enumerate(roles_of(table.names, valued=bool(kinds & {*VALUES}))):
         if mine is None and column not in said.values():
-            _refuse_foreign_unit(table, name)
+            _refuse_foreign_unit(table, table.names[column])
         if mine is None or mine in said or mine.kind in replaced or column in said.values():
             continue
         if mine in found:
@@ -195,28 +140,33 @@ def _recognised(table: Table, said: Mapping[Role, int]) -> dict[Role, int]:
 def _refuse_foreign_unit(table: Table, name: str) -> None:
     """Stop at an angle or a wavelength in a unit that is not known; it would count as not there."""
     behind = units.bracket(name)
-    if behind is not None and (known := role(behind[0])) and known.kind in (*_ANGLES, "wavelength"):
-        expected = "nm or µm" if known.kind == "wavelength" else "deg or rad"
+    if behind is not None and (known := role(behind[0])) and known.kind in (*ANGLES, "wavelength"):
+        expected = "nm or µm" if known.kind == "wavelength" else "deg, rad or gon"
         got = f"the column {shown(name)} is in {shown(behind[1]) or 'no unit'}, expected {expected}"
         raise ReadError(f"{table.source}: {got}. Convert it, or say what it is: {EXAMPLE}.")
 
 
 def _refuse_angles(table: Table, angles: Mapping[str, int]) -> None:
-    missing = [name for name in ("theta_i", "theta_o") if name not in angles]
+    for zenith, elevation in ELEVATIONS.items():
+        if {zenith, elevation} <= angles.keys():
+            expected = f"expected one: {elevation} is 90° − {zenith}. {_choose(zenith)}"
+            raise ReadError(f"{table.source}: {zenith} and {elevation}, {expected}")
+    missing = [name for name, other in ELEVATIONS.items() if not {name, other} & angles.keys()]
     if missing:
-        expected = " and ".join(f"{name} (or {', '.join(ALIASES[name])})" for name in missing)
+        expected = " and ".join(f"{name} (or {', '.join(ALIASES[name][:4])}, …)" for name in missing)
         raise ReadError(f"{table.source}: {_found(table)}, expected {expected}. Name them: {EXAMPLE}.")
-    azimuths = angles.keys() - {"theta_i", "theta_o"}
+    azimuths = angles.keys() & {"phi", "phi_i", "phi_o"}
     if "phi" in azimuths and len(azimuths) > 1:
         found = " and ".join(sorted(azimuths))
         raise ReadError(f"{table.source}: {found}, expected phi, or phi_i and phi_o. {_choose('phi')}")
     if len(azimuths & {"phi_i", "phi_o"}) == 1:
         (alone,) = azimuths
-        remedy = f'If it is the relative azimuth, pass columns="phi={table.label(angles[alone])}" (--columns).'
+        which = table.names[angles[alone]] or angles[alone] + 1
+        remedy = f'If it is the relative azimuth, pass columns="phi={which}" (--columns).'
         raise ReadError(f"{table.source}: {alone} alone, expected phi_i and phi_o. {remedy}")
 
 
-def _quantity(table: Table, roles: Iterable[Role], quantity: str | None) -> tuple[str, str]:
+def _quantity(table: Table, roles: Mapping[Role, int], quantity: str | None) -> tuple[str, str]:
     """The kind of the value columns and the quantity they hold."""
     kinds = [kind for kind in VALUES if any(mine.kind == kind for mine in roles)]
     choices = ", ".join(QUANTITIES)
@@ -234,7 +184,9 @@ def _quantity(table: Table, roles: Iterable[Role], quantity: str | None) -> tupl
         raise ReadError(f"{table.source}: {' and '.join(kinds)} at once, expected one quantity. {_choose(kinds[0])}")
     if kinds == ["value"]:
         why = "They differ by π or cos θ_o, which a fit would absorb unseen, so fitmat refuses to guess"
-        got = f"the column value does not say what it holds, expected {choices}"
+        bands = [table.label(column) for mine, column in roles.items() if mine.channel]
+        which = f"the columns {listed(bands)} do not say what they hold" if bands else ""
+        got = f"{which or 'the column value does not say what it holds'}, expected {choices}"
         raise ReadError(f"{table.source}: {got}. {why}: pass quantity= (--quantity).")
     return kinds[0], kinds[0]
 
@@ -247,8 +199,7 @@ def _beside(table: Table, kind: str, roles: Mapping[Role, int], values: Iterable
     found = {channel: given.get(channel, given.get("", -1)) for channel in values}
     if -1 in found.values() or given.keys() - found.keys() - {""}:
         named, wanted = (", ".join(str(Role(kind, name)) for name in names) for names in (given, found))
-        remedy = f"Name them alike, or give one plain {kind}."
-        raise ReadError(f"{table.source}: {named} given, expected {wanted}. {remedy}")
+        raise ReadError(f"{table.source}: {named} given, expected {wanted}. Name them alike, or give one plain {kind}.")
     return found
 
 

@@ -9,8 +9,8 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from fitmat.errors import ReadError
-from fitmat.measurements.parsing.columns import VALUES, role
 from fitmat.measurements.parsing.contents import shown
+from fitmat.measurements.parsing.names import VALUES, role
 from fitmat.measurements.samples import default_channels
 
 

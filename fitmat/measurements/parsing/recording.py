@@ -40,6 +40,8 @@ class Recording:
         doubts: Reason → which values the file itself marks as no datum, (n, c).
         notes: Plain sentences: conventions of the format, what was assumed.
         distinct: Whether no geometry can occur twice, because the format is a grid.
+        unsaid_side: The flag that exchanges the mirror side and the light's, and the one that confirms them; empty
+            where format or user has settled which is which.
     """
 
     source: str
@@ -52,6 +54,7 @@ class Recording:
     doubts: dict[str, Bool[np.ndarray, "n c"]] = dataclasses.field(default_factory=dict)
     notes: tuple[str, ...] = ()
     distinct: bool = False
+    unsaid_side: tuple[str, ...] = ()
 
     __repr__ = brief
 

@@ -35,6 +35,7 @@ class Table:
         cells: The cells, columns in the order of `names`.
         lines: Line number in the file of each row, (n,), from 1.
         notes: What was found out while reading.
+        stated: Name, number and line of the comments that state a number by name, "# theta_i = 30 deg".
     """
 
     source: str
@@ -42,6 +43,7 @@ class Table:
     cells: pl.DataFrame
     lines: Int[np.ndarray, " n"]
     notes: tuple[str, ...] = ()
+    stated: tuple[tuple[str, float, int], ...] = ()
 
     __repr__ = brief
 

@@ -10,9 +10,10 @@ import numpy as np
 from fitmat.errors import ReadError
 from fitmat.maths.directions import from_angles
 from fitmat.measurements.options import Options
-from fitmat.measurements.parsing import contents, units
-from fitmat.measurements.parsing.angles import directions
+from fitmat.measurements.parsing import contents, scales, units
+from fitmat.measurements.parsing.angles import directions, unsaid_side
 from fitmat.measurements.parsing.columns import Columns, assign
+from fitmat.measurements.parsing.constants import with_constants
 from fitmat.measurements.parsing.recording import Recording, pivot, sentinels
 from fitmat.measurements.parsing.table import Table
 from fitmat.measurements.samples import default_channels
@@ -31,18 +32,19 @@ def recording(table: Table, columns: str | Mapping[str, str | int] | None, optio
     """
     if options.where is not None:
         table = table.chosen(options.where)
+    table = with_constants(table, columns, options.constants)
     layout = assign(table, columns, options.quantity)
     angles, assumed = directions(table, layout.angles, options)
     theta_i, phi_i, theta_o, phi_o = angles.T
+    scale = _scale(table, layout, options)
     value, sigma = _stacked(table, layout.values), _stacked(table, layout.sigmas) if layout.sigmas else None
-    if percent := _percent(table, layout):
-        value, sigma = value / percent, None if sigma is None else sigma / percent
-        assumed = (*assumed, "Values in %, as the header says, divided by 100.")
     doubts = {"flagged invalid": np.broadcast_to(_flagged(table, layout.marks)[:, None], value.shape)}
+    doubts |= sentinels(value)
+    value, sigma = scales.plain(value, sigma, scale)
     if layout.quantity == "signal":
-        reference = _stacked(table, layout.references)
         spread = _stacked(table, layout.reference_sigmas) if layout.reference_sigmas else None
-        doubts |= sentinels(value) | {"reference reading not positive": ~(reference > 0)}
+        reference, spread = scales.plain(_stacked(table, layout.references), spread, scale)
+        doubts |= {"reference reading not positive": ~(reference > 0)}
         value, sigma = _ratio((value, sigma), (np.where(reference > 0, reference, np.nan), spread))
     unused = (f"Columns not used: {contents.listed(layout.unused)}.",) if layout.unused else ()
     found = Recording(
@@ -54,18 +56,39 @@ def recording(table: Table, columns: str | Mapping[str, str | int] | None, optio
         channels=tuple(layout.values) if any(layout.values) else default_channels(1),
         sigma=sigma,
         doubts=doubts,
-        notes=(*table.notes, *assumed, *unused),
+        notes=(*table.notes, *scales.note(scale), *assumed, *unused),
+        unsaid_side=unsaid_side(layout.angles, options),
     )
     labels = _labels(table, layout.marks)
     return found if labels is None else pivot(found, labels)
+
+
+def _scale(table: Table, layout: Columns, options: Options) -> str | None:
+    """How the values are written: as the user says, or in percent where the header says so.
+
+    Raises:
+        ReadError: a column's name says that it holds logarithms and the user does not, or both say different things.
+    """
+    for column in (*layout.values.values(), *layout.sigmas.values()):
+        name, scale = scales.stated(table.names[column])
+        if scale and options.scale is None:
+            remedy = f"pass --scale {scale}; if they are plain numbers, --scale linear (scale=)"
+            got = f"the name of {table.label(column)} says that it holds logarithms of {contents.shown(name)}"
+            raise ReadError(f"{table.source}: {got}, expected to be told. To read them as such, {remedy}.")
+    if not _percent(table, layout):
+        return options.scale
+    if options.scale not in (None, "percent"):
+        got = f"the header says %, --scale says {options.scale}"
+        raise ReadError(f"{table.source}: {got}, expected them to agree. Correct the header, or leave the flag out.")
+    return "percent"
 
 
 def _stacked(table: Table, columns: Mapping[str, int]) -> np.ndarray:
     return np.stack([table.numbers(column) for column in columns.values()], axis=1)
 
 
-def _percent(table: Table, layout: Columns) -> int:
-    """100 where the values are percentages, 0 where they are not; σ is in the unit of its values.
+def _percent(table: Table, layout: Columns) -> bool:
+    """Whether the header says that the values are percentages; σ is in the unit of its values.
 
     Raises:
         ReadError: some columns are in % and others not, or a quantity that has a unit of its own is.
@@ -73,7 +96,7 @@ def _percent(table: Table, layout: Columns) -> int:
     stated = {c: units.split(table.names[c])[1] == "%" for c in (*layout.values.values(), *layout.sigmas.values())}
     others = [*layout.references.values(), *layout.reference_sigmas.values()]
     if not any(stated.values()) and not any(units.split(table.names[c])[1] == "%" for c in others):
-        return 0
+        return False
     if layout.quantity not in ("reflectance_factor", "panel_ratio"):
         got = f"{layout.quantity} or its sigma in %, expected {layout.quantity} in its own unit"
         remedy = (
@@ -83,7 +106,7 @@ def _percent(table: Table, layout: Columns) -> int:
     if not all(stated[c] for c in layout.values.values()):
         named = contents.listed(table.label(c) for c, is_percent in stated.items() if is_percent)
         raise ReadError(f"{table.source}: only {named} in %, expected all values alike. Write them in one unit.")
-    return 100
+    return True
 
 
 def _ratio(

@@ -5,9 +5,13 @@ It knows no name and converts nothing.
 
 import re
 
+LONGEST = 200
+"""A name of more characters has no unit."""
+
 _SPELLINGS = {
     "deg": ("deg", "degs", "degree", "degrees", "°"),
     "rad": ("rad", "rads", "radian", "radians"),
+    "gon": ("gon",),
     "%": ("%", "percent", "pct"),
     "µm": ("um", "µm", "μm", "micron", "microns"),
     "": ("nm", "1/sr", "sr-1", "sr^-1", "sr^{-1}", "sr⁻¹", "1", "w/m2/sr", "w/m^2/sr", "w/m²/sr", "w/(m2 sr)"),
@@ -16,32 +20,34 @@ _SPELLINGS = {
 
 _UNITS = {spelling: unit for unit, spellings in _SPELLINGS.items() for spelling in spellings}
 _ANY = "|".join(sorted(map(re.escape, _UNITS), key=len, reverse=True))
-_BEHIND = re.compile(rf"(?i)^(.*?\S)\s*(?:[\[(]\s*({_ANY})\s*[\])]|/\s*({_ANY})|_(deg|degrees|rad|radians|percent))$")
+_WORDS = "deg|degrees|rad|radians|gon|percent"
+_BEHIND = re.compile(rf"(?i)^(.*?\S)\s*(?:[\[(]\s*({_ANY})\s*[\])]|/\s*({_ANY})|_({_WORDS}))$")
 _BRACKET = re.compile(r"^(.*?\S)\s*[\[(]([^\[\]()]*)[\])]$")
 
 
 def split(name: str) -> tuple[str, str]:
-    """A name without its unit, and the unit: "deg", "rad", "%", "µm", or "" for any other.
+    """A name without its unit, and the unit: "deg", "rad", "gon", "%", "µm", or "" for any other.
 
     Example:
         >>> split("theta_i [Rad]")
         ('theta_i', 'rad')
     """
-    found = _BEHIND.match(name.strip())
+    name = " ".join(name.split())
+    found = _BEHIND.match(name) if len(name) <= LONGEST else None
     if found is None:
-        return name.strip(), ""
+        return name, ""
     return found[1], _UNITS[(found[2] or found[3] or found[4]).lower()]
 
 
 def bracket(name: str) -> tuple[str, str] | None:
     """A name and whatever stands in brackets behind it, None where nothing does."""
-    found = _BRACKET.match(name.strip())
+    found = _BRACKET.match(name.strip()) if len(name) <= LONGEST else None
     return (found[1], found[2]) if found else None
 
 
 def is_row(cells: tuple[str, ...]) -> bool:
     """Whether the cells are units, one of them that of an angle."""
-    return any(_UNITS.get(cell.strip("[]() ").lower()) in ("deg", "rad") for cell in cells)
+    return any(_UNITS.get(cell.strip("[]() ").lower()) in ("deg", "rad", "gon") for cell in cells)
 
 
 def named(name: str, cell: str) -> str:

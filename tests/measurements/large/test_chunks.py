@@ -236,6 +236,36 @@ def test_radians_are_asked_about_as_in_one_piece(tmp_path: Path) -> None:
     assert_same(chunks.scan(path, rows=33, angle_unit="radians"), fm.read(path, angle_unit="radians"))
 
 
+@pytest.mark.parametrize("name", ["phi", "theta_o"])
+def test_one_column_in_radians_is_asked_about_as_in_one_piece(name: str, tmp_path: Path) -> None:
+    columns = numbers()
+    columns[name] = np.round(np.deg2rad(columns[name]), 5)
+    path = saved(tmp_path, lines(columns))
+    said = []
+    for read in (fm.read, lambda path: chunks.scan(path, rows=33)):
+        with pytest.raises(ReadError, match=f"--angle-unit {name}=radians") as raised:
+            read(path)
+        said.append(str(raised.value))
+    assert said[0] == said[1]
+    unit = f"{name}=radians"
+    assert_same(chunks.scan(path, rows=33, angle_unit=unit), fm.read(path, angle_unit=unit))
+
+
+def test_constants_of_a_large_file_are_those_of_one_piece(tmp_path: Path) -> None:
+    columns = numbers()
+    del columns["theta_i"]
+    plain = lines(columns)
+    path = saved(tmp_path, ["# theta_i = 30 deg", *plain])
+    assert_same(chunks.scan(path, rows=33), fm.read(path))
+    path = saved(tmp_path, plain)
+    said = {"theta_i": 40.0}
+    assert_same(chunks.scan(path, rows=33, constants=said), fm.read(path, constants=said))
+    path = saved(tmp_path, ["# theta_i = 30 deg", *plain, "# theta_i = 60 deg", *plain[1:]])
+    for read in (fm.read, lambda path: chunks.scan(path, rows=33)):
+        with pytest.raises(ReadError, match="comments state theta_i = 30 in row 1 and 60 in row 403"):
+            read(path)
+
+
 @pytest.mark.parametrize("period", [2, 64, 100])
 def test_the_part_is_spread_evenly_over_rows_and_over_what_repeats(period: int, tmp_path: Path) -> None:
     """Of rows in which an angle repeats with a period, the part has all its values about equally often."""

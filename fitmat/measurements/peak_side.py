@@ -1,0 +1,102 @@
+"""Side of the peak: whether the curves of a file peak in the mirror direction or back towards the light.
+
+It turns nothing round: a retro-reflector and a mirror whose azimuth is counted from the other side look the same.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from fitmat.measurements.incidences import incidences
+from fitmat.measurements.samples import Measurements
+
+NEAR = np.deg2rad(15.0)
+"""A peak within this angle of a direction lies there, if it is not as near to the opposite one."""
+
+ASIDE = np.deg2rad(15.0)
+"""Azimuth from the plane of incidence up to which a sample belongs to the curve in it."""
+
+TILTED = (np.deg2rad(8.0), np.deg2rad(70.0))
+"""Incidences that are judged: the two directions are apart, and a curve has room beyond them."""
+
+STANDS_OUT = 1.5
+"""A peak is this many times the curve's median over the angle."""
+
+FALLS = 0.75
+"""Beside a peak, on both sides, a curve falls below this fraction of it; what grows towards grazing does not."""
+
+BESIDE, TOP = np.deg2rad(45.0), np.deg2rad(8.0)
+"""Angle within which it falls so far, and within which nothing is higher."""
+
+CLEAR = 6.0
+"""A peak exceeds the median, and what lies beside it, by so many standard deviations of the noise."""
+
+
+def with_peak_side(m: Measurements, unsaid_side: Sequence[str]) -> Measurements:
+    """The measurements, with a warning where their curves peak towards the light instead of the mirror direction.
+
+    Args:
+        m: From a file whose mirror side may be the other one.
+        unsaid_side: The flag that exchanges the two sides, and the one that confirms them; empty where it is settled.
+    """
+    found = towards_light(m) if unsaid_side else ()
+    if not found:
+        return m
+    exchange, confirm = unsaid_side
+    angles = ", ".join(f"{angle:.3g}°" for angle in found)
+    warning = (
+        f"The values peak back towards the light, not in the mirror direction (at {angles} incidence). Either the file "
+        f"counts its angles from the other side: pass {exchange}; or the sample is a retro-reflector: confirm it with "
+        f"{confirm}."
+    )
+    return dataclasses.replace(m, warnings=(*m.warnings, warning))
+
+
+def towards_light(m: Measurements) -> tuple[float, ...]:
+    """Incidences in degrees whose curves peak back towards the light; none if any has a peak in the mirror direction.
+
+    Judged is the channel with most valid values, in the plane of incidence.
+    """
+    channel = int(m.valid.sum(axis=0).argmax())
+    phi, signed = m.phi, m.signed_theta_o
+    used = m.valid[:, channel] & (np.minimum(phi, np.pi - phi) < ASIDE)
+    back = []
+    for lit in incidences(m.wi, used):
+        at = np.deg2rad(lit.theta_i_deg)
+        if not TILTED[0] <= at <= TILTED[1]:
+            continue
+        angle, value = _curve(signed[lit.rows], m.value[lit.rows, channel])
+        if _peaks(angle, value, at):
+            return ()
+        if _peaks(angle, value, -at):
+            back.append(lit.theta_i_deg)
+    return tuple(back)
+
+
+def _curve(angle: np.ndarray, value: np.ndarray) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
+    """The mean value at each angle, sorted."""
+    angles, group = np.unique(np.round(angle, 4), return_inverse=True)
+    return angles, np.bincount(group, value) / np.bincount(group)
+
+
+def _peaks(angle: np.ndarray, value: np.ndarray, at: float) -> bool:
+    """Whether the curve has a peak near an angle."""
+    near = np.flatnonzero(np.abs(angle - at) < min(NEAR, 0.75 * abs(at)))
+    if len(near) == 0 or len(value) < 5:
+        return False
+    top = near[value[near].argmax()]
+    apart, height = angle - angle[top], value[top]
+    sides = [value[(side * apart > 0) & (side * apart < BESIDE)] for side in (-1.0, 1.0)]
+    middle = float(np.median(np.interp(np.linspace(angle[0], angle[-1], 181), angle, value)))
+    # Of three neighbours f, g, h the scatter of f − 2g + h is √6 times the noise.
+    noise, inner = np.abs(np.diff(value, 2)) / (0.6745 * np.sqrt(6.0)), value[1:-1]
+    floor = np.median(noise[inner <= middle]) if (inner <= middle).any() else 0.0
+    relative = np.median(noise / np.maximum(np.abs(inner), max(middle, 1e-300)))
+    low = height * min(FALLS, 1.0 / (1.0 + CLEAR * relative))
+    return bool(
+        all(side.size and np.quantile(side, 0.25) < low for side in sides)
+        and height >= value[np.abs(apart) < TOP].max()
+        and height > max(STANDS_OUT * middle, middle + CLEAR * floor)
+    )

@@ -1,0 +1,70 @@
+"""Plausible values: whether the numbers of a file can be what they are said to be; if not, the user is asked.
+
+It converts nothing: logarithms and percent are doubted, never assumed.
+"""
+
+import numpy as np
+
+from fitmat.errors import ReadError
+from fitmat.maths.directions import mirror
+from fitmat.measurements.options import Options
+from fitmat.measurements.samples import Measurements
+
+MOST_NEGATIVE = 0.6
+"""Noise about zero makes half of the values negative; from this share on, and three standard deviations of a fair coin
+beyond the half, it does not."""
+
+DEEP = 0.1
+"""Logarithms go this far below zero, as a fraction of the largest value; a floor that was subtracted twice does not."""
+
+AWAY, BACK, UPRIGHT = np.deg2rad(30.0), np.deg2rad(15.0), np.deg2rad(75.0)
+"""Reflectance factors are judged this far from the mirror direction and from the light, up to this zenith angle."""
+
+BRIGHTEST = 2.0
+"""A reflectance factor that no surface has there: it would reflect twice what falls on it."""
+
+COMPARED = ("reflectance_factor", "panel_ratio")
+"""Quantities that are 1 for a perfect white surface."""
+
+
+def refuse_implausible(m: Measurements, quantity: str, options: Options) -> None:
+    """Stop where values look like logarithms, or like percent, and the user has not said how they are written.
+
+    Raises:
+        ReadError: they do; the flags that mend or confirm it are named.
+    """
+    if options.scale is not None:
+        return
+    for name, value, valid in zip(m.channels, m.value.T, m.valid.T, strict=True):
+        where = m.source if len(m.channels) == 1 else f"{m.source}, channel {name}"
+        _refuse_logarithms(value[valid], where)
+        if quantity in COMPARED and not options.unknown_scale:
+            _refuse_percent(np.pi * value[valid & _diffuse(m)], where)
+
+
+def _refuse_logarithms(value: np.ndarray, where: str) -> None:
+    share = np.count_nonzero(value < 0) / max(len(value), 1)
+    if len(value) < 3 or share < max(MOST_NEGATIVE, 0.5 + 1.5 / np.sqrt(len(value)), 0.5):
+        return
+    if -np.quantile(value, 0.05) < DEEP * value.max():
+        return
+    got = f"{share:.0%} of the values are negative, expected reflected light"
+    remedy = (
+        "If they are logarithms, say which: --scale db, --scale log10 or --scale ln; if they are noise, --scale linear"
+    )
+    raise ReadError(f"{where}: {got}. {remedy} (scale=).")
+
+
+def _diffuse(m: Measurements) -> np.ndarray:
+    """Which samples stand away from the mirror direction, from the light and from grazing angles, (n,)."""
+    beside_mirror = np.sum(mirror(m.wi) * m.wo, axis=1) > np.cos(AWAY)
+    beside_light = np.sum(m.wi * m.wo, axis=1) > np.cos(BACK)
+    return ~beside_mirror & ~beside_light & (np.minimum(m.wi[:, 2], m.wo[:, 2]) > np.cos(UPRIGHT))
+
+
+def _refuse_percent(factor: np.ndarray, where: str) -> None:
+    if not len(factor) or (typical := float(np.quantile(factor, 0.25))) <= BRIGHTEST:
+        return
+    got = f"reflectance factors of {typical:.3g} and more far from the mirror direction, expected at most about 1"
+    remedy = "If they are percent, pass --scale percent; if only relative, --unknown-scale; if right, --scale linear"
+    raise ReadError(f"{where}: {got}. {remedy} (scale=).")

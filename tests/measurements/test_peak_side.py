@@ -1,0 +1,115 @@
+"""Curves that peak back towards the light are said, with the flag that exchanges the sides; nothing else raises it.
+
+The curves are closed forms: a Gaussian peak about a direction, Lambert, the qualitative model of Oren & Nayar (1994).
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fitmat as fm
+from fitmat.measurements.large import chunks
+
+INCIDENCES = np.array([20.0, 40.0, 60.0])
+SENSOR = np.arange(-80.0, 81.0, 5.0)
+
+
+def gaussian(theta_i: np.ndarray, theta_o: np.ndarray, at: float) -> np.ndarray:
+    """0.1 and a peak of 1 where theta_o = at · theta_i, in degrees; 8° wide."""
+    return 0.1 + np.exp(-(((theta_o - at * theta_i) / 8.0) ** 2))
+
+
+def oren_nayar(theta_i: np.ndarray, theta_o: np.ndarray) -> np.ndarray:
+    """Albedo 1, σ = 40°: A + B max(0, cos φ) sin α tan β (eq. 30), positive theta_o on the mirror side."""
+    s2 = np.deg2rad(40.0) ** 2
+    a, b = 1 - 0.5 * s2 / (s2 + 0.33), 0.45 * s2 / (s2 + 0.09)
+    high, low = (np.deg2rad(f(theta_i, np.abs(theta_o))) for f in (np.maximum, np.minimum))
+    return (a + b * (theta_o < 0) * np.sin(high) * np.tan(low)) / np.pi
+
+
+def table(values, **columns: np.ndarray) -> dict[str, np.ndarray]:
+    """In-plane curves of `values(theta_i, theta_o)`, theta_o positive on the mirror side."""
+    theta_i, theta_o = (part.ravel() for part in np.meshgrid(INCIDENCES, SENSOR, indexing="ij"))
+    return {"theta_i": theta_i, "theta_o": theta_o, "brdf": values(theta_i, theta_o)} | columns
+
+
+def with_azimuth(flat: dict[str, np.ndarray], mirror: float) -> dict[str, np.ndarray]:
+    """The curves with positive theta_o and the mirror side at the azimuth `mirror`."""
+    forward = flat["theta_o"] > 0
+    return flat | {"theta_o": np.abs(flat["theta_o"]), "phi": np.where(forward, mirror, 180.0 - mirror)}
+
+
+def mirrored(theta_i: np.ndarray, theta_o: np.ndarray) -> np.ndarray:
+    return gaussian(theta_i, theta_o, -1.0)
+
+
+def test_a_mirror_side_at_azimuth_0_is_said_with_its_flag():
+    flat = table(lambda i, o: gaussian(i, o, 1.0))
+    (warning,) = fm.read(with_azimuth(flat, 0.0)).warnings
+    assert "peak back towards the light, not in the mirror direction (at 20°, 40°, 60° incidence)" in warning
+    assert "pass --specular-azimuth 0; or" in warning
+    assert warning.endswith("confirm it with --specular-azimuth 180.")
+    turned = fm.read(with_azimuth(flat, 0.0), specular_azimuth=0)
+    right = fm.read(flat)
+    assert turned.warnings == right.warnings == ()
+    np.testing.assert_allclose(turned.wo, right.wo, atol=1e-12)
+
+
+def test_a_negative_mirror_side_is_said_with_its_flag():
+    (warning,) = fm.read(table(mirrored)).warnings
+    assert "pass --forward negative; or" in warning
+    assert fm.read(table(mirrored), forward="negative").warnings == ()
+
+
+def test_a_scan_of_the_light_side_alone_is_said():
+    flat = table(mirrored)
+    kept = flat["theta_o"] < 0
+    assert len(fm.read({name: column[kept] for name, column in flat.items()}).warnings) == 1
+
+
+def test_a_retro_reflector_is_confirmed():
+    assert fm.read(with_azimuth(table(mirrored), 180.0), specular_azimuth=180).warnings == ()
+    assert fm.read(table(mirrored), forward="positive").warnings == ()
+
+
+@pytest.mark.parametrize("share", [0.3, 1.0])
+def test_a_retro_reflector_with_a_gloss_needs_no_confirmation(share: float):
+    both = fm.read(table(lambda i, o: gaussian(i, o, -1.0) + share * gaussian(i, o, 1.0)))
+    assert both.warnings == ()
+
+
+@pytest.mark.parametrize("values", [oren_nayar, lambda i, o: np.full(len(i), 0.3)], ids=["Oren–Nayar", "Lambert"])
+@pytest.mark.parametrize("noise", [0.0, 0.02, 0.1])
+def test_diffuse_surfaces_raise_no_alarm(values, noise: float):
+    rng = np.random.default_rng(1)
+    for _ in range(30):
+        flat = table(values)
+        flat["brdf"] = flat["brdf"] * (1 + noise * rng.normal(size=len(flat["brdf"])))
+        assert fm.read(flat).warnings == ()
+
+
+def test_noise_alone_raises_no_alarm():
+    rng = np.random.default_rng(1)
+    assert not any(fm.read(table(lambda i, o: rng.normal(size=len(i)))).warnings for _ in range(100))
+
+
+def test_synthetic_files_raise_no_alarm():
+    for path in sorted((Path(__file__).parents[2] / "data/synthetic").glob("*.csv")):
+        assert fm.read(path).warnings == (), path
+
+
+def test_a_large_file_says_the_same(tmp_path):
+    flat = with_azimuth(table(mirrored), 180.0)
+    path = tmp_path / "large.csv"
+    rows = np.stack(list(flat.values()), axis=1)
+    np.savetxt(path, rows, delimiter=",", header=",".join(flat), comments="", fmt="%.8g")
+    found = chunks.scan(path, rows=20)
+    assert found.part.warnings == fm.read(path).warnings
+    assert len(found.part.warnings) == 1
+
+
+def test_an_examination_warns_and_a_print_shows_it():
+    measured = fm.read(table(mirrored))
+    assert measured.warnings[0] in fm.examine(measured).warnings
+    assert f"WARNING: {measured.warnings[0]}" in str(measured)
