@@ -5,28 +5,20 @@ sources, versions, machine. The folder is the business of `program_files`. No fo
 """
 
 import contextlib
-import dataclasses
 import functools
 import hashlib
 import os
-import platform
 import re
 import threading
-import types
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import jax
 import numpy as np
 from jax.core import Tracer
 
-from fitmat.maths import program_files
-
-PACKAGE = Path(__file__).parents[1]
-"""Whose sources decide what a program computes."""
+from fitmat.maths import defects, program_files, program_names
 
 LAST = "last-run"
 """File that names the programs of the last run."""
@@ -34,6 +26,7 @@ LAST = "last-run"
 MOST_AHEAD = 16
 """Programs that are loaded ahead."""
 
+defects.mend()  # before anything is compiled
 
 UNFUSED: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False}
 """Options of XLA, not more than one: it keeps what it compiled under a name that holds them in no certain order.
@@ -66,13 +59,13 @@ class Program:
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """What the function returns."""
         leaves, structure = jax.tree.flatten((args, kwargs))
-        arrays = [leaf for leaf in leaves if isinstance(leaf, _ARRAYS)]
+        arrays = [leaf for leaf in leaves if isinstance(leaf, program_names.ARRAYS)]
         if any(isinstance(leaf, Tracer) for leaf in arrays):
             return self._function(*args, **kwargs)
         return self._found(leaves, structure, arrays, (args, kwargs))(*arrays)
 
     def _found(self, leaves: list[Any], structure: Any, arrays: list[Any], given: Any) -> Callable[..., Any]:
-        rest = tuple(None if isinstance(leaf, _ARRAYS) else leaf for leaf in leaves)
+        rest = tuple(None if isinstance(leaf, program_names.ARRAYS) else leaf for leaf in leaves)
         kinds = tuple(map(type, rest))  # 1, 1.0 and True are equal
         key = (structure, rest, kinds, tuple((array.shape, array.dtype) for array in arrays))
         run = self._ready.get(key)
@@ -86,7 +79,7 @@ class Program:
             free: Examples of the others, which give shape and type.
         """
         leaves, structure = jax.tree.flatten(((*fixed, *free), {}))
-        arrays = [leaf for leaf in leaves if isinstance(leaf, _ARRAYS)]
+        arrays = [leaf for leaf in leaves if isinstance(leaf, program_names.ARRAYS)]
         run = self._found(leaves, structure, arrays, ((*fixed, *free), {}))
         kept = jax.device_put(arrays[: len(arrays) - len(free)])
         return lambda *given: run(*kept, *given)
@@ -114,8 +107,10 @@ class Program:
 
         shapes = [jax.ShapeDtypeStruct(array.shape, array.dtype) for array in arrays]
         try:
-            words = f"{_words(self._function)} {_words(given)} {_surroundings()}"
-        except _Unnamed:
+            words = " ".join(
+                [program_names.words(self._function), program_names.words(given), program_names.surroundings()]
+            )
+        except program_names.Unnamed:
             return _compiled(flat, shapes, self._fused)
         name = f"{self._name}-{hashlib.sha256(words.encode()).hexdigest()[:24]}"
         _USED.append(f"{name} {_KINDS[self._fused]}")
@@ -193,9 +188,6 @@ def _tell(given: tuple[tuple, dict]) -> None:
         told(name)
 
 
-_ARRAYS = (jax.Array, np.ndarray, np.generic)
-
-
 def program(function: Callable[..., Any]) -> Program:
     """A function as a `Program`; for use as a decorator."""
     return Program(function)
@@ -232,61 +224,6 @@ def _calling(exported: Any, name: str) -> Callable[..., Any]:
 
     call.__name__ = name
     return call
-
-
-class _Unnamed(Exception):
-    """Something has no name that means the same in another process."""
-
-
-def _words(x: Any) -> str:
-    """All of a structure that decides a program, as text; arrays by shape and type only."""
-    if isinstance(x, _ARRAYS):
-        return f"{x.dtype}{x.shape}"
-    if x is None or isinstance(x, str | bytes | bool | int | float | complex):
-        return repr(x)
-    if dataclasses.is_dataclass(x) and not isinstance(x, type):
-        parts = (f"{f.name}={_words(getattr(x, f.name))}" for f in dataclasses.fields(x) if f.compare)
-        return f"{_words(type(x))}({', '.join(parts)})"
-    if isinstance(x, tuple | list):
-        return f"{_words(type(x))}({', '.join(map(_words, x))})"
-    if isinstance(x, set | frozenset):
-        return f"{_words(type(x))}({', '.join(sorted(map(_words, x)))})"
-    if isinstance(x, Mapping):
-        return f"({', '.join(f'{_words(k)}: {_words(v)}' for k, v in sorted(x.items()))})"
-    if isinstance(x, functools.partial):
-        return f"partial({_words(x.func)}, {_words(x.args)}, {_words(x.keywords)})"
-    if isinstance(x, type | types.FunctionType):
-        return _named(x)
-    raise _Unnamed
-
-
-def _named(x: type | types.FunctionType) -> str:
-    """A class or function by where it stands: the package's own, whose sources are known, or a builtin."""
-    if x.__module__ != "builtins" and not x.__module__.startswith(f"{PACKAGE.name}."):
-        raise _Unnamed
-    closed = getattr(x, "__closure__", None) or ()
-    return f"{x.__module__}.{x.__qualname__}{_words(tuple(cell.cell_contents for cell in closed)) if closed else ''}"
-
-
-@functools.cache
-def _surroundings() -> str:
-    """What decides a program beside its arguments: sources, versions, machine, and the settings of JAX."""
-    sources = hashlib.sha256()
-    for path in sorted(PACKAGE.rglob("*.py")):
-        sources.update(str(path.relative_to(PACKAGE)).encode() + b"\0" + path.read_bytes())
-    versions = [f"{name} {version(name)}" for name in ("jax", "jaxlib", "equinox", "optimistix", "lineax")]
-    return f"{sources.hexdigest()} {versions} {machine()} {jax.default_backend()} {jax.config.read('jax_enable_x64')}"
-
-
-@functools.cache
-def machine() -> str:
-    """The processor with all that it can do: code compiled for one may crash on another."""
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
-            lines = {line for line in file if line.startswith(("model name", "flags", "Features", "CPU part"))}
-        return " ".join(sorted(lines))
-    except OSError:
-        return f"{platform.machine()} {platform.processor()}"
 
 
 def load_ahead() -> None:

@@ -17,6 +17,7 @@ from fitmat.fitting.result import Fit
 from fitmat.judgement.design.candidates import Limits, proposed
 from fitmat.judgement.design.design import Design, Proposal
 from fitmat.judgement.design.filters import _assimilated
+from fitmat.reports.pictures import refuse_picture
 
 CATALOGUE = Path(__file__).parents[2] / "data" / "synthetic"
 
@@ -176,7 +177,8 @@ def test_what_cannot_be_planned_is_refused(lambert: Fit) -> None:
 
 def test_a_plan_is_shown_as_text_as_json_and_drawn(lambert: Fit, tmp_path: Path) -> None:
     posterior, picture = fm.laplace(lambert, seed=1), tmp_path / "plan.png"
-    found = plan.propose([posterior], "kd", count=2, picture=picture)
+    found = plan.propose([posterior], "kd", count=2)
+    plan.draw(found, picture)
     with Image.open(picture) as image:
         assert min(image.size) > 300
     assert "For kd of lambert, the sample that tells most: light at" in plan.as_text(found)
@@ -185,9 +187,9 @@ def test_a_plan_is_shown_as_text_as_json_and_drawn(lambert: Fit, tmp_path: Path)
     assert [len(p["theta_o_deg"]) for p in told["proposals"]] == [1, 1]
     assert told["sd_before"]["kd"] == {"sd": pytest.approx(found.sd[0]), "of": "value"}
     with pytest.raises(OutputError, match=r"plan.png: already exists; choose another name, or --force"):
-        plan.propose([posterior], "kd", picture=picture)
+        refuse_picture(picture)
     with pytest.raises(OutputError, match=r"plan.txt: no picture, expected a name that ends in png, svg, pdf"):
-        plan.propose([posterior], "kd", picture=tmp_path / "plan.txt")
+        refuse_picture(tmp_path / "plan.txt")
     curves = fm.next_angles(posterior, kind="curve", count=1)
     samples = curves.candidates.used.sum(axis=1)
     np.testing.assert_allclose(curves.gains, np.sqrt(1 + samples / 60), rtol=CLOSED)

@@ -329,7 +329,7 @@ def test_the_page_tells_the_match_in_words(match: Match, known: bool) -> None:
     """Every variable is there, and the sentences say what the numbers do."""
     folder = jinja2.FileSystemLoader(Path(report.__file__).with_name("templates"))
     environment = jinja2.Environment(loader=folder, autoescape=True, undefined=jinja2.StrictUndefined)
-    environment.filters["png"] = str
+    environment.filters["picture"] = lambda figure, words: str(figure)
     telling = dataclasses.replace(match.telling, known=known)
     fits = match.empirical.fit, match.microfacet.fit
     both = [imitated(fits[1 - k].model, fits[k].model, metric) for k in (0, 1) for metric in IMITATED]

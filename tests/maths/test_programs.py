@@ -22,7 +22,7 @@ import fitmat as fm
 from fitmat.fitting import information
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.likelihood import prepare
-from fitmat.maths import program_files, programs
+from fitmat.maths import program_files, program_names, programs
 from fitmat.maths.program_files import SUFFIX, kept, remove
 from fitmat.maths.programs import Program, program
 from fitmat.measurements.noise import measured_noise
@@ -117,7 +117,7 @@ def ended(process: subprocess.Popen[str]) -> Run:
 def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Where a copy of the package lies that nobody edits while the processes run: its sources name the programs."""
     place = tmp_path_factory.mktemp("package")
-    shutil.copytree(programs.PACKAGE, place / "fitmat")
+    shutil.copytree(program_names.PACKAGE, place / "fitmat")
     return place
 
 
@@ -283,8 +283,8 @@ def test_tuples_and_static_coordinates(place: Path, traced: list[str]) -> None:
     assert len(set(traced)) == 2
     moved = coordinates(model)
     other = dataclasses.replace(moved, upper=(*moved.upper[:-1], 2 * moved.upper[-1]))
-    assert programs._words(other) != programs._words(moved)
-    assert programs._words(dataclasses.replace(moved, names=())) == programs._words(moved)
+    assert program_names.words(other) != program_names.words(moved)
+    assert program_names.words(dataclasses.replace(moved, names=())) == program_names.words(moved)
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
@@ -367,8 +367,8 @@ def test_the_disk_refuses(
     def refuse(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    sources = programs._surroundings()  # reads them
-    monkeypatch.setattr(programs, "_surroundings", lambda: sources)
+    sources = program_names.surroundings()  # reads them
+    monkeypatch.setattr(program_names, "surroundings", lambda: sources)
     monkeypatch.setattr(program_files.os if call == "replace" else Path, call, refuse)
     assert_unkept(given, traced)
     monkeypatch.undo()
@@ -494,14 +494,14 @@ def test_another_machine_has_programs_of_its_own(
 ) -> None:
     assert_right(given)
     with monkeypatch.context() as patched:
-        patched.setattr(programs, "machine", lambda: "another machine")
-        programs._surroundings.cache_clear()
+        patched.setattr(program_names, "machine", lambda: "another machine")
+        program_names.surroundings.cache_clear()
         assert_right(given)
         assert len(files(place)) == len(set(traced)) == 2
-    programs._surroundings.cache_clear()
+    program_names.surroundings.cache_clear()
     assert_right(given)
     assert len(traced) == 2
 
 
 def test_the_machine_is_known() -> None:
-    assert programs.machine().strip()
+    assert program_names.machine().strip()
