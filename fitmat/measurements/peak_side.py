@@ -1,10 +1,10 @@
-"""Side of the peak: whether the curves of a file peak in the mirror direction or back towards the light.
+"""Side of the peak: whether the curves of a file peak in the mirror direction, or where another convention puts it.
 
 It turns nothing round: a retro-reflector and a mirror whose azimuth is counted from the other side look the same.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -35,21 +35,29 @@ CLEAR = 6.0
 
 
 def with_peak_side(m: Measurements, unsaid_side: Sequence[str]) -> Measurements:
-    """The measurements, with a warning where their curves peak towards the light instead of the mirror direction.
+    """The measurements, with a warning where their curves peak elsewhere than in the mirror direction.
 
     Args:
         m: From a file whose mirror side may be the other one.
         unsaid_side: The flag that exchanges the two sides, and the one that confirms them; empty where it is settled.
     """
-    found = towards_light(m) if unsaid_side else ()
-    if not found:
+    if not unsaid_side:
         return m
     exchange, confirm = unsaid_side
-    angles = ", ".join(f"{angle:.3g}°" for angle in found)
+    back = towards_light(m)
+    if len(found := upside_down(m)) > len(back):
+        warning = (
+            f"The values peak at 90° less the mirror angle (at {_listed(found)} incidence): theta_o, or theta_i, looks "
+            "like an elevation above the surface. If it is, say so by its name, --columns elevation_o=theta_o; if not, "
+            f"confirm with {confirm}."
+        )
+        return dataclasses.replace(m, warnings=(*m.warnings, warning))
+    if not back:
+        return m
     warning = (
-        f"The values peak back towards the light, not in the mirror direction (at {angles} incidence). Either the file "
-        f"counts its angles from the other side: pass {exchange}; or the sample is a retro-reflector: confirm it with "
-        f"{confirm}."
+        f"The values peak back towards the light, not in the mirror direction (at {_listed(back)} incidence). Either "
+        f"the file counts its angles from the other side: pass {exchange}; or the sample is a retro-reflector: confirm "
+        f"it with {confirm}."
     )
     return dataclasses.replace(m, warnings=(*m.warnings, warning))
 
@@ -59,6 +67,17 @@ def towards_light(m: Measurements) -> tuple[float, ...]:
 
     Judged is the channel with most valid values, in the plane of incidence.
     """
+    return _peaking(m, lambda theta_i: -theta_i)
+
+
+def upside_down(m: Measurements) -> tuple[float, ...]:
+    """The same where they peak at 90° less the mirror angle, on either side, far from the mirror direction."""
+    found = [_peaking(m, lambda theta_i, side=side: side * (np.pi / 2 - theta_i)) for side in (1.0, -1.0)]
+    return max(found, key=len)
+
+
+def _peaking(m: Measurements, where: Callable[[float], float]) -> tuple[float, ...]:
+    """Incidences in degrees whose curves peak at an angle; none if any has a peak in the mirror direction."""
     channel = int(m.valid.sum(axis=0).argmax())
     phi, signed = m.phi, m.signed_theta_o
     used = m.valid[:, channel] & (np.minimum(phi, np.pi - phi) < ASIDE)
@@ -67,12 +86,18 @@ def towards_light(m: Measurements) -> tuple[float, ...]:
         at = np.deg2rad(lit.theta_i_deg)
         if not TILTED[0] <= at <= TILTED[1]:
             continue
+        if abs(where(at) - at) < 2 * NEAR and where(at) > 0:
+            continue
         angle, value = _curve(signed[lit.rows], m.value[lit.rows, channel])
         if _peaks(angle, value, at):
             return ()
-        if _peaks(angle, value, -at):
+        if _peaks(angle, value, where(at)):
             back.append(lit.theta_i_deg)
     return tuple(back)
+
+
+def _listed(angles: Sequence[float]) -> str:
+    return ", ".join(f"{angle:.3g}°" for angle in angles)
 
 
 def _curve(angle: np.ndarray, value: np.ndarray) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:

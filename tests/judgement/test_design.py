@@ -187,9 +187,9 @@ def test_a_plan_is_shown_as_text_as_json_and_drawn(lambert: Fit, tmp_path: Path)
     assert [len(p["theta_o_deg"]) for p in told["proposals"]] == [1, 1]
     assert told["sd_before"]["kd"] == {"sd": pytest.approx(found.sd[0]), "of": "value"}
     with pytest.raises(OutputError, match=r"plan.png: already exists; choose another name, or --force"):
-        refuse_picture(picture)
+        refuse_picture(picture, force=False)
     with pytest.raises(OutputError, match=r"plan.txt: no picture, expected a name that ends in png, svg, pdf"):
-        refuse_picture(tmp_path / "plan.txt")
+        refuse_picture(tmp_path / "plan.txt", force=False)
     curves = fm.next_angles(posterior, kind="curve", count=1)
     samples = curves.candidates.used.sum(axis=1)
     np.testing.assert_allclose(curves.gains, np.sqrt(1 + samples / 60), rtol=CLOSED)

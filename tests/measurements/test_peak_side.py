@@ -113,3 +113,14 @@ def test_an_examination_warns_and_a_print_shows_it():
     measured = fm.read(table(mirrored))
     assert measured.warnings[0] in fm.examine(measured).warnings
     assert f"WARNING: {measured.warnings[0]}" in str(measured)
+
+
+@pytest.mark.parametrize("elevated", ["theta_i", "theta_o"])
+def test_an_elevation_beside_a_zenith_angle_is_noticed(elevated: str) -> None:
+    """The lobe of light at 20° and 65° in the file's angles; alone the elevation moves it to 70° and 25°."""
+    theta_i, theta_o = (p.ravel() for p in np.meshgrid([20.0, 65.0], np.arange(1, 90, 2.0), indexing="ij"))
+    value = 0.1 + np.exp(-(((theta_o - theta_i) / 8) ** 2))
+    angles = {"theta_i": theta_i, "theta_o": theta_o, "phi": np.full(value.shape, 180.0)}
+    assert fm.read({**angles, "brdf": value}).warnings == ()
+    (warning,) = fm.read({**angles, elevated: 90 - angles[elevated], "brdf": value}).warnings
+    assert "looks like an elevation above the surface" in warning

@@ -7,12 +7,13 @@ import os
 from collections.abc import Mapping
 
 import numpy as np
+import polars as pl
 
 from fitmat.errors import ReadError
 from fitmat.measurements.parsing import contents, tensor
 from fitmat.measurements.parsing.recording import HORIZON, Recording
 from fitmat.measurements.parsing.tensor import claims as claims
-from fitmat.measurements.warped_grid import RGLMaterial, Warp
+from fitmat.measurements.warped_grid import Nodes, RGLMaterial, Warp
 
 RANKS = {"theta_i": 1, "phi_i": 1, "ndf": 2, "sigma": 2, "vndf": 4, "luminance": 4}
 """Fields of float32 that every material has → number of dimensions."""
@@ -20,10 +21,13 @@ RANKS = {"theta_i": 1, "phi_i": 1, "ndf": 2, "sigma": 2, "vndf": 4, "luminance":
 _BYTES = ("description", "jacobian")
 _ROUNDING = 1e-3
 _TEXT = 200
+_DIGITS = 5
+# Of directions: neighbours of a grid are further apart, roundings of float32 are not.
 
 _BELOW = "node of the file's grid whose direction is at or below the horizon"
 _EMPTY = "incidence at which the file's distribution of visible normals is zero"
 _DARK = "node that the file marks as not measured (luminance 0)"
+_TWICE = "node in the direction of an earlier one: its half vector is the normal, or its azimuth has come full circle"
 _NO_AREA = "incidence at which the file's projected area sigma is zero"
 
 
@@ -44,6 +48,7 @@ def load(path: str | os.PathLike[str]) -> Recording:
         _NO_AREA: nodes.unseen,
         _DARK: fields["luminance"].reshape(-1) == 0,
     }
+    doubts[_TWICE] = _again(nodes, ~np.logical_or.reduce([*doubts.values()]))
     return Recording(
         source=source,
         wi=nodes.wi,
@@ -54,6 +59,14 @@ def load(path: str | os.PathLike[str]) -> Recording:
         doubts={reason: np.broadcast_to(bad[:, None], shape) for reason, bad in doubts.items() if bad.any()},
         notes=tuple(_notes(made)),
     )
+
+
+def _again(nodes: Nodes, usable: np.ndarray) -> np.ndarray:
+    """Which usable nodes have the directions of an earlier one, (n,): they are one measurement."""
+    places = np.round(np.concatenate([nodes.wi, nodes.wo], axis=1)[usable], _DIGITS) + 0.0
+    found = np.zeros(len(usable), bool)
+    found[usable] = ~pl.DataFrame(places).select(first=pl.struct(pl.all()).is_first_distinct())["first"].to_numpy()
+    return found
 
 
 def material(path: str | os.PathLike[str]) -> RGLMaterial:

@@ -347,6 +347,20 @@ def test_evaluation_gives_the_rows_back(tmp_path: Path):
     assert np.abs(back - measured.value[keep]).max() < EDGE_OF_GRID * measured.value[keep].max()
 
 
+def test_a_direction_that_several_nodes_share_counts_once(tmp_path: Path):
+    """Of g × g nodes the first row is the mirror direction g times, and the first azimuth is the last one again."""
+    path = saved(material(np.random.default_rng(9), Layout(grid=20)), tmp_path)
+    measured = read(path)
+    keep = measured.valid.any(axis=1)
+    for wi in np.unique(measured.wi[keep], axis=0):
+        mine = keep & (measured.wi == wi).all(axis=1)
+        mirror = np.linalg.norm(measured.wo - wi * [-1, -1, 1], axis=1) < 1e-6
+        assert np.count_nonzero(mine & mirror) <= 1
+    places = np.round(np.concatenate([measured.wi, measured.wo], axis=1)[keep], 6)
+    assert len(np.unique(places, axis=0)) == len(places)
+    assert any("in the direction of an earlier one" in reason for reason in measured.masked)
+
+
 def test_what_cannot_be_a_measurement_is_doubted_with_its_reason(tmp_path: Path):
     fields = material(np.random.default_rng(6), Layout(3, 2 * np.pi, incidences=4))
     fields["luminance"][0, 1, 5, 5] = 0
