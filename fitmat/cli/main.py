@@ -28,6 +28,7 @@ def main() -> None:
     # A run is short and makes few reference cycles; looking for them, at the end above all, takes a fifth of its time.
     gc.disable()
     atexit.register(gc.freeze)
+    misuse: type[BaseException] = typer.BadParameter.__bases__[0]  # which typer does not name
     stdout, place = sys.stdout, os.fstat(1)
     try:
         try:
@@ -38,7 +39,7 @@ def main() -> None:
             # Where its reader has gone, Typer and Rich put something else in the place of stdout.
             if sys.stdout is not stdout or not os.path.samestat(os.fstat(1), place):
                 raise BrokenPipeError
-    except typer.BadParameter.__bases__ as error:
+    except misuse as error:
         process.misused(error)
     except FitmatError as error:
         process.end(str(error))

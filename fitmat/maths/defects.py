@@ -4,8 +4,7 @@ It knows released versions only, and changes nothing for any other.
 """
 
 import os
-
-import jaxlib
+from importlib.metadata import version
 
 FLAGS = {"0.10.2": "--xla_cpu_experimental_ynn_fusion_type="}
 """Version of jaxlib → what XLA is told. A version that does not know a flag ends the process.
@@ -16,7 +15,7 @@ FLAGS = {"0.10.2": "--xla_cpu_experimental_ynn_fusion_type="}
 
 def mend() -> None:
     """Tell XLA to compile what its version gets wrong in another way; in vain where JAX has compiled already."""
-    flag = FLAGS.get(jaxlib.__version__)
+    flag = FLAGS.get(version("jaxlib"))
     said = os.environ.get("XLA_FLAGS", "")
     if flag is not None and flag.rstrip("=") not in said:
         os.environ["XLA_FLAGS"] = f"{said} {flag}".strip()

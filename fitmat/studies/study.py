@@ -266,7 +266,8 @@ def judge(
     say(words, 0, count)
 
     def looked(posterior: Posterior) -> Findings:
-        return find(posterior, along, *(_examined(posterior, seed) if posterior in looked_at else ()))
+        asked, check = _examined(posterior, seed) if posterior in looked_at else (None, None)
+        return find(posterior, along, asked, check)
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for found in pool.map(looked, posteriors):

@@ -91,7 +91,7 @@ def parameters(posterior: Posterior, undetermined: Collection[str] = ()) -> list
 def _discrepancy(posterior: Posterior) -> Quantity:
     """s; where the best fit has none, its interval is one-sided."""
     best, draws = posterior.fit.discrepancy, posterior.discrepancy
-    ends = limits(best, draws) if best > 0 else np.array([0.0, np.quantile(draws, 0.95)])
+    ends = limits(np.asarray(best), draws) if best > 0 else np.array([0.0, np.quantile(draws, 0.95)])
     words = "spread of ∛(f cosθ_i) that the model cannot explain"
     return Quantity(
         *("discrepancy", "s", "sr^(-1/3)", words, np.array([best]), np.array([draws.std()]), ends[None]),

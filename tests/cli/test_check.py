@@ -150,6 +150,7 @@ def test_what_was_found_is_printed_before_a_picture_fails(
     assert Path("map.png").read_text() == "before"
 
 
+@pytest.mark.study
 def test_check_out_of_process_prints_json_and_nothing_else(environment: dict[str, str], sparse: Path) -> None:
     ended = shell(environment, "check", sparse, "--json", "--plot", "map.png")
     assert (ended.returncode, ended.stderr) == (0, "")

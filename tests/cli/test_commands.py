@@ -308,6 +308,7 @@ def test_out_is_refused_then_replaced_by_force(run, tmp_path):
     assert names == ["fit.json", "notes.txt", "posterior-lambert+phong.parquet", "report.html"]
 
 
+@pytest.mark.study
 def test_default_folder_is_numbered(run, tmp_path):
     path = tmp_path / "a.b.csv"
     path.write_bytes((DATA / "sparse.csv").read_bytes())
@@ -530,6 +531,7 @@ def test_closed_pipe_and_full_stdout(environment):
     assert_refused(Ended(ended.returncode, "", ended.stderr), "cannot write the output: No space left on device")
 
 
+@pytest.mark.study
 def test_terminal_and_names_that_are_not_utf8(environment, tmp_path):
     path = os.fsdecode(os.fsencode(tmp_path) + b"/\xff[bold]<b>.csv")
     Path(path).write_bytes((DATA / "sparse.csv").read_bytes())

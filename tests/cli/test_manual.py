@@ -51,6 +51,7 @@ def test_fresnel_page_ranks_the_terms(capsys):
     assert schlick > 0.1 > f82 > belcour
 
 
+@pytest.mark.study
 def test_check_prints_laws_and_names_surprises(capsys, monkeypatch):
     """blinn-phong breaks energy and says so; with its declaration removed it is named."""
     assert manual.check(only=lambda name: name in ("lambert", "blinn-phong")) == []

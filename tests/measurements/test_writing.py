@@ -121,7 +121,7 @@ def named(*channels: str, sigma: float | None = 0.1) -> Measurements:
     return dataclasses.replace(from_arrays([0.1, 0.2], [0.3, 0.4], value, sigma=sigma), channels=channels)
 
 
-@settings(deadline=None, derandomize=True, max_examples=120)
+@settings(deadline=None, derandomize=True, max_examples=40)
 @given(
     channels=st.lists(st.sampled_from(NASTY) | st.text(max_size=6), min_size=1, max_size=4),
     suffix=st.sampled_from([".csv", ".parquet", ".alta"]),

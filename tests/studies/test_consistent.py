@@ -106,7 +106,7 @@ def made(seed: int) -> fm.Measurements:
     """Readings of a random material at random angles, with a random noise that is given or not."""
     rng = np.random.default_rng(seed)
     name, ranges = TRUTHS[seed % len(TRUTHS)]
-    drawn = {key: float(np.exp(rng.uniform(*np.log(limits)))) for key, limits in ranges.items()}
+    drawn: dict[str, Any] = {key: float(np.exp(rng.uniform(*np.log(limits)))) for key, limits in ranges.items()}
     theta_i = np.sort(rng.uniform(0, np.deg2rad(75), rng.integers(1, 5)))
     theta_o = np.linspace(-1.3, rng.uniform(0.3, 1.4), rng.integers(7, 60))
     noise = float(np.exp(rng.uniform(np.log(1e-3), np.log(0.2))))

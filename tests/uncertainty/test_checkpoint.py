@@ -103,6 +103,7 @@ def steps(fit: Fit, folder: Path) -> int:
     return resumable_steps(fit, seed=1, max_steps=STEPS, checkpoint=folder)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kills", [(2,), pytest.param((1, 3), marks=pytest.mark.study)], ids=["once", "twice"])
 def test_a_killed_run_ends_with_the_same_chain(
     fit: Fit, whole: Posterior, tmp_path: Path, kills: tuple[int, ...]

@@ -132,6 +132,7 @@ def block_by_block(path: Path) -> None:
     list(tables.tables(path, 2))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("read", "step"), [(in_memory, 2), (block_by_block, 5)], ids=["in memory", "block by block"])
 def test_a_damaged_file_is_one_sentence(read, step, tmp_path, capfd):
     """Where polars' threads panic, too: they print on the descriptor of stderr, which belongs to whoever called."""

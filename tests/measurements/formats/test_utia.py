@@ -138,6 +138,7 @@ def test_other_content_is_refused(tmp_path, content, message):
         utia.load(path)
 
 
+@pytest.mark.study
 def test_no_fault_raises_anything_but_a_read_error(tmp_path):
     rng, path = np.random.default_rng(5), tmp_path / "fuzz.bin"
     raw = sample(rng)

@@ -266,6 +266,7 @@ def test_constants_of_a_large_file_are_those_of_one_piece(tmp_path: Path) -> Non
             read(path)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("period", [2, 64, 100])
 def test_the_part_is_spread_evenly_over_rows_and_over_what_repeats(period: int, tmp_path: Path) -> None:
     """Of rows in which an angle repeats with a period, the part has all its values about equally often."""

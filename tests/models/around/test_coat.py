@@ -193,6 +193,7 @@ def test_coats_are_reciprocal(hemisphere: Hemisphere, name: str) -> None:
     np.testing.assert_allclose(fm.evaluate(model, wi, wo), fm.evaluate(model, wo, wi), rtol=1e-9)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("alpha", always({1.0}, [0.1, 1.0]))
 def test_rough_coat_crosses_as_visible_normals_do(alpha: float) -> None:
     """T² of the pair from an average over Heitz's visible normals; R = 1 − ∫T/η², by reciprocity of the crossing."""

@@ -118,6 +118,7 @@ def test_a_shared_calibration_error_is_covered() -> None:
     assert np.mean(blind) < 0.3
 
 
+@pytest.mark.study
 def test_a_planted_dark_signal_is_recovered() -> None:
     truth = fm.model("lambert+ggx", kd=0.05, alpha=0.1, eta=1.5)
     shown = Instrument(dark=0.01)

@@ -118,6 +118,7 @@ def _surfaces(order: int, *, dielectric: bool) -> list[tuple[Surface, list[Value
     return [(Surface(DISTRIBUTIONS[d], (ax, ay), fresnel, dielectric), same) for (d, ax, ay), same in rows.items()]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("estimator", "order"),
     [
@@ -193,6 +194,7 @@ def test_white_furnace(distribution: AbstractDistribution) -> None:
         assert abs(albedo - 1) <= SIGMAS * error + QUADRATURE, (alpha, theta, albedo, error)
 
 
+@pytest.mark.study
 @BOTH
 def test_nothing_is_lost_where_nothing_is_absorbed(distribution: AbstractDistribution) -> None:
     """Dielectric: reflected and transmitted light add up to 1, from the normal to 85°."""
@@ -288,6 +290,7 @@ def test_depths_are_the_integrals_over_exponentials() -> None:
     np.testing.assert_allclose(reach[0], left * last / (last + 0.7), rtol=EXACT)
 
 
+@pytest.mark.study
 @ESTIMATORS
 def test_cut_paths_are_counted(estimator: Estimator, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two collisions at most: the value is the sum of two orders, and the energy missing in it is stated."""
