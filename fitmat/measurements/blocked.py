@@ -66,8 +66,9 @@ def _reached(y: Float[np.ndarray, " n"], curve: np.ndarray, x: np.ndarray) -> Fl
         second = curve[other] == curve[zeros]
         gap = np.where(second & (x[other] != x[one]), x[one] - x[other], np.inf)
         way = (x[np.clip(one + towards, 0, len(x) - 1)] - x[one]) / gap
-        rise = np.where(y[other] > 0, np.maximum(y[one], 0.0) / np.where(y[other] > 0, y[other], 1.0), 1.0)
-        line, power = y[one] + (y[one] - y[other]) * way, y[one] * rise**way
+        with np.errstate(over="ignore"):  # of two readings that rise the nearer one counts
+            rise = np.where(y[other] > 0, np.maximum(y[one], 0.0) / np.where(y[other] > 0, y[other], 1.0), 1.0)
+            line, power = y[one] + (y[one] - y[other]) * way, y[one] * np.minimum(rise, 1.0) ** way
         met = np.maximum(np.minimum(np.minimum(line, power), y[one]), 0.0)
         sides.append(np.where(curve[one] == curve[zeros], met, np.nan))
     found[zeros] = np.nan_to_num(np.fmin(*sides))

@@ -247,6 +247,7 @@ class _Pictures:
 
     def embedded(self, draw: Draw, what: str) -> Markup:
         """The picture that `draw` draws, or why there is none."""
+        what = visible(what)
         buffer = io.BytesIO()
         try:
             draw().savefig(buffer, format="png", dpi=DPI)

@@ -66,7 +66,7 @@ def test_a_version_that_may_not_know_the_flag_is_not_told_it(monkeypatch: pytest
 def test_values_of_many_rows_are_those_of_few(lobe: str, hemisphere) -> None:
     """Values and gradients of 20,000 rows in one program, beside blocks of 4,000."""
     wi, wo = (jnp.asarray(hemisphere(ROWS, seed)) for seed in (1, 2))
-    model = fm.model(lobe)
+    model = fm.model(f"{lobe}-over-lambert" if LOBES[lobe].kind == "cover" else lobe)
     whole = np.asarray(jax.jit(evaluate_pairs)(model, wi, wo))
     few = jax.jit(evaluate_pairs)
     parts = [np.asarray(few(model, wi[k : k + 4_000], wo[k : k + 4_000])) for k in range(0, ROWS, 4_000)]

@@ -119,8 +119,9 @@ def elevation_by_name(t: Table, rng: np.random.Generator) -> None:
 
 
 def elevation_of_the_sensor(t: Table, rng: np.random.Generator) -> None:
-    """Where all light comes within 15° of 45° nobody can tell an elevation."""
-    if "phi" in t.angles and (np.abs(t.angles["theta_i"] - 45.0) > 15.0).any():
+    """Nobody can tell it of light within 15° of 45°, or where the peak leaves the scan."""
+    aside = np.abs(t.angles["theta_i"] - 45.0)
+    if "phi" in t.angles and ((aside > 15.0) & (aside <= 25.0)).any():
         _angle(t, "theta_o", 90.0 - t.angles["theta_o"])
     else:
         elevation_by_name(t, rng)

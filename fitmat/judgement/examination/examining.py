@@ -159,8 +159,10 @@ def examine(measurements: Measurements) -> Examination:
         >>> print(examine(fm.from_arrays(np.full(3, 0.5), [-0.5, 0.0, 0.5], [0.1, 0.1, 0.3])))  # doctest: +SKIP
     """
     arguments.kind("measurements", measurements, Measurements)
-    looked = _looked(measurements)
-    return dataclasses.replace(looked, prospects=prospects(measurements, looked.noise))
+    noise = _noise(measurements)
+    laws = tuple(channel_laws(measurements, noise)) if noise.known else (None,) * len(measurements.channels)
+    looked = _looked(measurements, noise)
+    return dataclasses.replace(looked, noise=laws, prospects=prospects(measurements, laws))
 
 
 def warnings(measurements: Measurements, *, tilted: bool = False) -> tuple[str, ...]:
@@ -170,24 +172,22 @@ def warnings(measurements: Measurements, *, tilted: bool = False) -> tuple[str, 
         measurements: From `fitmat.read`.
         tilted: Whether a lean of the sample is fitted, so that there is no need to speak of it.
     """
-    looked = _looked(measurements)
+    looked = _looked(measurements, _noise(measurements))
     return tuple(dataclasses.replace(looked, tilt=None if tilted else looked.tilt).warnings)
 
 
-def _looked(m: Measurements) -> Examination:
-    """Everything but the prospects."""
+def _looked(m: Measurements, noise: Noise) -> Examination:
+    """Everything but the laws of the noise and the prospects, which warn of nothing."""
     where = coverage(m)
-    noise = _noise(m)
     agreement = consistency(m, noise.sigma, mirror_frame(m.wi, m.wo), known=noise.known, step=_step(where))
     summed = [implied_albedo(m, noise.sigma, incidence) for incidence in where.incidences]
     every = np.arange(len(m.channels))[:: -(-len(m.channels) * max(len(where.incidences), 1) // MOST_CURVES)]
     curves = [(incidence, int(k)) for incidence in where.incidences for k in every if not where.scattered]
     peaks = [p for curve in curves if (p := peak(m, noise.sigma, *curve)) is not None]
-    laws = tuple(channel_laws(m, noise)) if noise.known else (None,) * len(m.channels)
     return Examination(
         measurements=m,
         sigma=noise.sigma,
-        noise=laws,
+        noise=(),
         noise_words=noise.words,
         values=tuple(value_range(m.value[m.valid[:, k], k]) for k in range(len(m.channels))),
         coverage=where,
