@@ -20,7 +20,8 @@ FAR = 5.0
 
 def without_blocked(m: Measurements) -> Measurements:
     """The measurements with `blocked` values masked and counted."""
-    found = blocked(m)
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is far above no zero
+        found = blocked(m)
     if not found.any():
         return m
     sigma = None if m.sigma is None else np.where(found, 1.0, m.sigma)

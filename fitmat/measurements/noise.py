@@ -37,6 +37,8 @@ LEAST_SIGMA = 1e-9
 
 _DIGITS = 8
 # So many digits behind the point are looked at; rounding to more is no noise that counts.
+_EXACT = 2.0**53
+# From here on every double is a whole number.
 _WHOLE = 1e-12
 # Rounding of a double when a decimal number is scaled.
 _T_DOF = 4.0
@@ -109,8 +111,9 @@ def last_digit(values: Float[np.ndarray, " n"]) -> float:
     """The power of ten of which all values, or all values times π, are whole multiples; 0 where there is none."""
     for factor in (1.0, np.pi):
         for digit in 10.0 ** -np.arange(_DIGITS):
-            whole = values * (factor / digit)
-            if (np.abs(whole - np.round(whole)) <= _WHOLE * np.maximum(np.abs(whole), 1.0)).all():
+            with np.errstate(over="ignore"):
+                whole = np.abs(values * (factor / digit))
+            if (whole < _EXACT).all() and (np.abs(whole - np.round(whole)) <= _WHOLE * np.maximum(whole, 1.0)).all():
                 return float(digit / factor)
     return 0.0
 
