@@ -86,7 +86,7 @@ def say(words: str, *, err: bool = False) -> None:
 def tell(words: str, stderr: IO[str]) -> None:
     """Say something on stderr, if anybody reads it; else go on."""
     try:
-        stderr.write(f"{visible(words, keep=chr(10))}\n")
+        stderr.write(visible(words, keep="\n") + "\n")
         stderr.flush()
     except OSError:
         silence(2)

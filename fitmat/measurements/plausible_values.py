@@ -19,9 +19,6 @@ DEEP = 0.1
 AWAY, BACK, UPRIGHT = np.deg2rad(30.0), np.deg2rad(15.0), np.deg2rad(75.0)
 """Reflectance factors are judged this far from the mirror direction and from the light, up to this zenith angle."""
 
-MIRRORED = np.array([-1.0, -1.0, 1.0])
-"""Signs that turn a direction into its mirror direction."""
-
 BRIGHTEST = 2.0
 """A reflectance factor that no surface has there: it would reflect twice what falls on it."""
 
@@ -59,7 +56,7 @@ def _refuse_logarithms(value: np.ndarray, where: str) -> None:
 
 def _diffuse(m: Measurements) -> np.ndarray:
     """Which samples stand away from the mirror direction, from the light and from grazing angles, (n,)."""
-    beside_mirror = np.sum(m.wi * MIRRORED * m.wo, axis=1) > np.cos(AWAY)
+    beside_mirror = np.sum(m.wi * [-1.0, -1.0, 1.0] * m.wo, axis=1) > np.cos(AWAY)
     beside_light = np.sum(m.wi * m.wo, axis=1) > np.cos(BACK)
     return ~beside_mirror & ~beside_light & (np.minimum(m.wi[:, 2], m.wo[:, 2]) > np.cos(UPRIGHT))
 

@@ -284,7 +284,8 @@ def _odd(posteriors: Sequence[Posterior]) -> tuple[str, ...]:
     fit = posteriors[0].fit
     if fit.n_values > fit.measurements.n_valid:
         return fit.measurements.warnings
-    return warnings(fit.measurements, tilted=any(Tilted.prefix in posterior.fit.name for posterior in posteriors))
+    tilted = any(Tilted.prefix in posterior.fit.name for posterior in posteriors)
+    return warnings(fit.measurements, fit.noise, tilted=tilted)
 
 
 def _examined(posterior: Posterior, seed: int) -> tuple[Identifiability, PredictiveCheck | None]:

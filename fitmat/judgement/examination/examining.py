@@ -165,14 +165,15 @@ def examine(measurements: Measurements) -> Examination:
     return dataclasses.replace(looked, noise=laws, prospects=prospects(measurements, laws))
 
 
-def warnings(measurements: Measurements, *, tilted: bool = False) -> tuple[str, ...]:
+def warnings(measurements: Measurements, noise: Noise, *, tilted: bool = False) -> tuple[str, ...]:
     """What the owner of a file should look into before believing a fit to it: those of `examine`, as sentences.
 
     Args:
         measurements: From `fitmat.read`.
+        noise: Theirs, by `measured_noise`, which takes its time.
         tilted: Whether a lean of the sample is fitted, so that there is no need to speak of it.
     """
-    looked = _looked(measurements, _noise(measurements))
+    looked = _looked(measurements, _noise(measurements, noise))
     return tuple(dataclasses.replace(looked, tilt=None if tilted else looked.tilt).warnings)
 
 
@@ -206,10 +207,10 @@ def _step(where: Coverage) -> float:
     return float(np.median(steps)) if steps and not where.scattered else DEFAULT_STEP
 
 
-def _noise(m: Measurements) -> Noise:
+def _noise(m: Measurements, known: Noise | None = None) -> Noise:
     """As `measured_noise`, but not from the neighbours in very large files, and `ASSUMED` where nothing is known."""
     if m.sigma is not None or m.value.size <= MOST_ESTIMATED:
-        found = measured_noise(m)
+        found = known or measured_noise(m)
         if found.known:
             return found
         because = found.words

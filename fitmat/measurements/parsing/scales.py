@@ -8,8 +8,7 @@ import re
 import numpy as np
 from jaxtyping import Float
 
-LONGEST = 200
-"""A name of more characters says nothing of its numbers."""
+from fitmat.measurements.parsing import units
 
 Numbers = Float[np.ndarray, "n c"]
 
@@ -33,7 +32,7 @@ def stated(name: str) -> tuple[str, str]:
         (('BRDF', 'db'), ('brdf', 'db'), ('brdf', ''))
     """
     name = " ".join(name.split())
-    if len(name) > LONGEST:
+    if len(name) > units.LONGEST:
         return name, ""
     if before := _BEFORE.fullmatch(name):
         scale = _NAMED[before[2].lower().replace("_", "")]

@@ -6,7 +6,7 @@ It knows no name and converts nothing.
 import re
 
 LONGEST = 200
-"""A name of more characters has no unit."""
+"""A name of more characters says neither a unit nor a scale nor a wavelength."""
 
 _SPELLINGS = {
     "deg": ("deg", "degs", "degree", "degrees", "°"),

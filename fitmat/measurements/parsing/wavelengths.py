@@ -5,11 +5,10 @@ It does not know what is measured at them.
 
 import re
 
+from fitmat.measurements.parsing import units
+
 RANGE = (300.0, 2500.0)
 """In nm, from the ultraviolet to the short-wave infrared; a bare number outside it is none."""
-
-LONGEST = 200
-"""A name of more characters is none."""
 
 _NAME = re.compile(r"(?:r|refl|reflectance|lambda|wl)?[ _]*(\d+(?:\.\d+)?)[ _]*(?:nm|[\[(]nm[\])])?", re.IGNORECASE)
 
@@ -21,5 +20,5 @@ def wavelength(name: str) -> str:
         >>> wavelength("450 nm"), wavelength("R_850.5"), wavelength("12"), wavelength("row 450")
         ('450', '850.5', '', '')
     """
-    found = _NAME.fullmatch(name.strip()) if len(name) <= LONGEST else None
+    found = _NAME.fullmatch(name.strip()) if len(name) <= units.LONGEST else None
     return found[1] if found and RANGE[0] <= float(found[1]) <= RANGE[1] else ""
