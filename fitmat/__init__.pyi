@@ -1,5 +1,6 @@
 # Measurements
 from .measurements.reader import read as read
+from .measurements.joining import join as join
 from .measurements.writing import write as write
 from .measurements.samples import from_arrays as from_arrays
 from .measurements.samples import Measurements as Measurements

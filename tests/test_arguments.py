@@ -81,7 +81,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
     "read": (
         {"source": {"theta_i": [1.0], "theta_o": [1.0], "brdf": [1.0]}},
         {
-            "source": (None, 5, 1j, [], FIT, {"theta_i": 1.0}),
+            "source": (None, 5, 1j, [], [5], [FIT], FIT, {"theta_i": 1.0}),
             **dict.fromkeys(("quantity", "angle_unit", "where", "scale", "forward"), TEXT),
             **dict.fromkeys(("intensity", "distance", "panel"), ("much", 1j, [], FIT)),
             "columns": (5, 1j, [], FIT),
@@ -91,6 +91,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             "instrument": NOUN,
         },
     ),
+    "join": ({"parts": [MEASURED]}, {"parts": (None, 5, MEASURED, [], [FIT], [MEASURED, "a.csv"], "ab")}),
     "write": (
         {"measurements": MEASURED, "path": "/proc/x.csv"},
         {"measurements": without(NOUN, fm.Measurements), "path": PATH, "force": FLAG},

@@ -5,7 +5,7 @@ It repairs nothing and drops nothing; what it cannot know it asks for.
 
 import dataclasses
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -13,6 +13,7 @@ import polars as pl
 
 from fitmat import arguments
 from fitmat.errors import ReadError
+from fitmat.measurements import joining
 from fitmat.measurements.blocked import without_blocked
 from fitmat.measurements.formats import alta, astm, excel, fred, lighttools, merl, parquet, rgl, ssdd, utia, zemax
 from fitmat.measurements.instrument import IDEAL, Instrument
@@ -55,7 +56,7 @@ Source = str | os.PathLike[str] | Mapping[str, Any] | Frame
 
 
 def read(
-    source: Source,
+    source: Source | Sequence[Source],
     *,
     columns: str | Mapping[str, str | int] | None = None,
     quantity: str | None = None,
@@ -71,7 +72,7 @@ def read(
     constants: Mapping[str, float] | None = None,
     instrument: Instrument = IDEAL,
 ) -> Measurements:
-    """Read BRDF measurements from a file, a data frame, an xarray object or a dict of arrays.
+    """Read BRDF measurements from a file or several, a data frame, an xarray object or a dict of arrays.
 
     Files of `FORMATS` are recognised by their content and say what they hold. Of text tables, Parquet files and the
     rest the columns are recognised, in any letter case (`fitmat.measurements.parsing.names.ALIASES` has more names):
@@ -85,7 +86,8 @@ def read(
 
     Args:
         source: Path of a file or of a stream, such as a pipe; pandas or polars data frame, xarray object, or name →
-            array of n numbers.
+            array of n numbers. Or a list of these: one measurement of one sample, each read by its own header, and
+            joined as `fitmat.measurements.joining.join` does.
         columns: Our name → name or number (from 1) in the file; or as text, "theta_i=Zenith,theta_o=3".
         quantity: What a column called value holds: "brdf", "brdf_cos", "reflectance_factor", "radiance" or
             "panel_ratio".
@@ -122,20 +124,41 @@ def read(
         *(quantity, angle_unit, forward, specular_azimuth, intensity, distance, where, panel, unknown_scale, scale),
         constants or {},
     )
-    recording = _recording(source, columns, options)
-    found = measured(recording, options)
-    if not found.valid.any():
-        listed = ", ".join(f"{count} {reason}" for reason, count in found.masked.items())
-        expected = "expected at least one value that can be used. Check the columns and units"
-        if found.masked.get("at or below the horizon") == found.n_samples:
-            expected += f'; where phi is the zenith angle, pass columns="{EXCHANGED}" (--columns)'
-        raise ReadError(f"{recording.source}: every row is masked ({listed}), {expected}.")
-    refuse_implausible(found, recording.quantity, options)
-    found = dataclasses.replace(
-        found, notes=(*found.notes, *_oddities(found, recording.distinct)), instrument=instrument
-    )
-    found = with_peak_side(found, recording.unsaid_side)
+    several = isinstance(source, list | tuple)
+    sources: Sequence[Any] = source if several else [source]
+    joining.refuse_twice(sources)
+    parts = [_part(one, columns, options, name) for one, name in zip(sources, joining.tails(sources), strict=True)]
+    found = joining.join([dataclasses.replace(part, instrument=instrument) for part, _ in parts])
+    distinct = len(parts) == 1 and parts[0][1]
+    found = dataclasses.replace(found, notes=(*found.notes, *_oddities(found, distinct)))
     return of_unknown_scale(found) if unknown_scale else found
+
+
+def _part(
+    source: Source, columns: str | Mapping[str, str | int] | None, options: Options, name: str | None
+) -> tuple[Measurements, bool]:
+    """What one source holds, called by that name if there is one, and whether no geometry can occur twice in it."""
+    try:
+        recording = _recording(source, columns, options)
+        found = measured(recording, options)
+        _refuse_all_masked(found)
+        refuse_implausible(found, recording.quantity, options)
+        found = with_peak_side(found, recording.unsaid_side)
+    except ReadError as error:
+        if name is None or not str(error).startswith(own := contents.name(name)):
+            raise
+        raise ReadError(name + str(error).removeprefix(own)) from error
+    return found if name is None else dataclasses.replace(found, source=name), recording.distinct
+
+
+def _refuse_all_masked(found: Measurements) -> None:
+    if found.valid.any():
+        return
+    listed = ", ".join(f"{count} {reason}" for reason, count in found.masked.items())
+    expected = "expected at least one value that can be used. Check the columns and units"
+    if found.masked.get("at or below the horizon") == found.n_samples:
+        expected += f'; where phi is the zenith angle, pass columns="{EXCHANGED}" (--columns)'
+    raise ReadError(f"{found.source}: every row is masked ({listed}), {expected}.")
 
 
 def measured(recording: Recording, options: Options) -> Measurements:

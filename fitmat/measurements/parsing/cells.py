@@ -20,7 +20,7 @@ WIDEST = 4096
 _SPACED = re.compile(r"\d\s+[-+.]?\d")
 _COMMENT = r"^\s*(#|%|//)"
 _ERROR_VALUE = rf"(?i)^\s*({'|'.join(map(re.escape, ERROR_VALUES))})\s*([,;\t]|[-+.\d#]|$)"
-_STATED = r"(?i)^\s*[#%;/]+\s*(\pL[^=:\d]*?)\s*[=:\s]\s*([-+]?\d+(?:\.\d*)?)\s*(?:°|deg|degrees?)?\s*$"
+_STATED = r"(?i)^\s*[#%;/]+\s*(\pL[^=:\d]*?)\s*[=:\s]\s*([-+]?\d+(?:\.\d*)?)\s*(?:°|deg|degrees?|nm|([uµμ]m))?\s*$"
 _SEMICOLON = r"^\s*;"
 _BLANK = r"^[\s,;]*$"
 _QUOTED = r'"[^"]*"'
@@ -177,10 +177,13 @@ def _is_number(cell: str) -> bool:
 
 
 def _stated(comments: pl.DataFrame) -> tuple[tuple[str, float, int], ...]:
-    """Name, number and line of the comments that state a number by name."""
+    """Name, number and line of the comments that state a number by name; of one in µm in nm."""
     parts = comments["text"].str.extract_groups(_STATED).struct.unnest()
-    known = parts.with_columns(comments["line"]).drop_nulls()
-    return tuple((str(name).strip(), float(number), int(line)) for name, number, line in known.rows())
+    known = parts.with_columns(comments["line"]).filter(parts.to_series(0).is_not_null())
+    return tuple(
+        (str(name).strip(), round(1000 * float(number), 6) if micron else float(number), int(line))
+        for name, number, micron, line in known.rows()
+    )
 
 
 def _names_wavelengths(cells: pl.DataFrame) -> bool:

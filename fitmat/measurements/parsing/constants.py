@@ -18,6 +18,9 @@ from fitmat.measurements.parsing.table import Table
 CONSTANTS = (*ANGLES, "wavelength")
 """What can be said to be the same in every row."""
 
+SHORTEST = 100.0
+"""Number from which a comment that calls it a wavelength means nm."""
+
 
 def with_constants(
     table: Table, columns: str | Mapping[str, str | int] | None, constants: Mapping[str, float]
@@ -32,7 +35,8 @@ def with_constants(
     Raises:
         ReadError: a constant has a column, is none of `CONSTANTS`, or comments state two numbers for it.
     """
-    there = {mine.kind: column for mine, column in roles(table, columns).items()}
+    found = roles(table, columns)
+    there = {mine.kind: column for mine, column in found.items()}
     for name, number in constants.items():
         said = f"{name} = {number:g} (--{name.replace('_', '-')})"
         if name not in CONSTANTS:
@@ -43,18 +47,20 @@ def with_constants(
         if not np.isfinite(number):
             raise ReadError(f"{table.source}: {said}, expected a number. Correct it.")
         table = _added(table, name, number, "as was said")
-    known = {*there, *constants}
+    known = {*there, *constants} | ({"channel"} if any(mine.channel for mine in found) else set())
     for name in _wanted(known):
-        if rows := [(number, row) for words, number, row in table.stated if role(words) == Role(name)]:
+        rows = [(number, row) for words, number, row in table.stated if role(words) == Role(name)]
+        if rows := [stated for stated in rows if name != "wavelength" or stated[0] >= SHORTEST]:
             _refuse_contradiction(table, name, rows)
             table = _added(table, name, rows[0][0], f"by the comment in row {rows[0][1]}")
     return table
 
 
 def _wanted(known: set[str]) -> list[str]:
-    """The angles that a file needs and has no column for."""
+    """The angles that a file needs and has no column for, and the wavelength, where no channel has a name."""
     wanted = [zenith for zenith, elevation in ELEVATIONS.items() if not {zenith, elevation} & known]
-    return [*wanted, *(["phi_i"] if "phi_o" in known and not {"phi", "phi_i"} & known else [])]
+    wanted += ["phi_i"] if "phi_o" in known and not {"phi", "phi_i"} & known else []
+    return wanted if {"wavelength", "channel"} & known else [*wanted, "wavelength"]
 
 
 def _refuse_contradiction(table: Table, name: str, rows: list[tuple[float, int]]) -> None:

@@ -35,7 +35,7 @@ class Table:
         cells: The cells, columns in the order of `names`.
         lines: Line number in the file of each row, (n,), from 1.
         notes: What was found out while reading.
-        stated: Name, number and line of the comments that state a number by name, "# theta_i = 30 deg".
+        stated: Name, number (in nm for one in µm) and line of the comments "# theta_i = 30 deg".
     """
 
     source: str
