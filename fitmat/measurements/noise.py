@@ -156,15 +156,22 @@ def channel_laws(m: Measurements, noise: Noise) -> list[tuple[float, float] | No
 
 def noise_law(value: Float[np.ndarray, " n"], sigma: Float[np.ndarray, " n"]) -> tuple[float, float]:
     """a (sr⁻¹) and b of σ² = a² + (b f)² by non-negative least squares on relative residuals; a is never 0."""
-    from scipy.optimize import nnls
-
     unit = float(sigma.max())
     value, sigma = value / unit, np.maximum(sigma / unit, LEAST_SIGMA)
     squares = np.stack([np.ones_like(value), value**2], axis=1) / sigma[:, None] ** 2
     scale = np.abs(squares).max(axis=0) + 1e-300
-    (a2, b2), _ = nnls(squares / scale, np.ones_like(value)) if len(value) > 1 else ((sigma[0] ** 2 * scale[0], 0.0), 0)
+    a2, b2 = _adding_to_one(squares / scale) if len(value) > 1 else (sigma[0] ** 2 * scale[0], 0.0)
     lowest = 1e-3 * float(sigma.min())
     return unit * float(max(np.sqrt(a2 / scale[0]), lowest)), float(np.sqrt(b2 / scale[1]))
+
+
+def _adding_to_one(columns: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "2"]:
+    """x ≥ 0 with the least |columns x − 1|², columns ≥ 0: the free solution, else the better of either column alone."""
+    free = np.linalg.lstsq(columns, np.ones(len(columns)), rcond=None)[0]
+    if free.min() >= 0.0:
+        return free
+    alone = np.diag(columns.sum(axis=0) / np.maximum((columns**2).sum(axis=0), 1e-300))
+    return min(alone, key=lambda x: float(np.sum((columns @ x - 1.0) ** 2)))
 
 
 def components(error: np.ndarray, level: np.ndarray, factor: np.ndarray) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.optimize
 
 import fitmat as fm
 from fitmat.judgement.examination.coverage import coverage, mirror_frame
@@ -368,6 +369,19 @@ def test_what_the_catalogue_calls_not_determined_is_not() -> None:
     glossy = [p for p in found.prospects if (p.model, p.gloss) == ("lambert+ggx", "glossy")]
     assert [p.name for p in glossy if p.verdict == "not determined"] == stated
     assert any("glossy plastic" in line and line.endswith("not determined: ks, eta.") for line in found.lines())
+
+
+def test_a_noise_law_is_the_non_negative_least_squares_solution() -> None:
+    rng = np.random.default_rng(7)
+    for _ in range(200):
+        value, sigma = np.exp(rng.normal(size=30) * 2), np.exp(rng.normal(size=30) * rng.uniform(0.1, 2))
+        sigma /= sigma.max()
+        squares = np.stack([1 / sigma**2, (value / sigma) ** 2], axis=1)
+        scale = squares.max(axis=0)
+        (a2, b2), _ = scipy.optimize.nnls(squares / scale, np.ones(30))
+        a, b = noise_law(value, sigma)
+        assert a == pytest.approx(max(np.sqrt(a2 / scale[0]), 1e-3 * sigma.min()), rel=1e-6)
+        assert b == pytest.approx(np.sqrt(b2 / scale[1]), rel=1e-6, abs=1e-12)
 
 
 @pytest.mark.parametrize(("absolute", "relative"), [(1e-3, 0.02), (1e-3, 0.0), (0.0, 0.02)])
