@@ -71,6 +71,7 @@ def join(parts: Sequence[Measurements]) -> Measurements:
         notes=(_counts(parts, names), *_told([part.notes for part in parts], names)),
         instrument=parts[0].instrument,
         warnings=_told([part.warnings for part in parts], names),
+        stated=tuple(stated for part in parts for stated in part.stated),
     )
 
 

@@ -187,6 +187,7 @@ def measured(recording: Recording, options: Options) -> Measurements:
         source=recording.source,
         masked=masked,
         notes=(note(recording.quantity, options), *recording.notes),
+        stated=recording.stated,
     )
     return without_blocked(found)
 

@@ -6,6 +6,7 @@ It converts no quantity and reads no file.
 import dataclasses
 import html
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -27,6 +28,22 @@ SCANNED = 5
 """Rows that a rotation of the sample has where it was turned between scans."""
 
 
+class StatedAlbedo(NamedTuple):
+    """What a file says that the values of one incidence add up to, as the TIS of a Zemax file; angles in radians.
+
+    Attributes:
+        theta_i: Zenith angle of incidence.
+        phi_i: Its azimuth.
+        channel: Name of the channel.
+        value: ∫ f_r cosθ_o dω_o as the file has it.
+    """
+
+    theta_i: float
+    phi_i: float
+    channel: str
+    value: float
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Measurements:
     """n samples of a BRDF in c channels.
@@ -43,6 +60,7 @@ class Measurements:
         notes: Plain sentences: factors applied, conventions assumed, oddities kept.
         instrument: What the values owe to the instrument that took them.
         warnings: Plain sentences: what may have been read otherwise than it was meant.
+        stated: What the file says that its values add up to.
     """
 
     wi: Float[np.ndarray, "n 3"]
@@ -56,6 +74,7 @@ class Measurements:
     notes: tuple[str, ...] = ()
     instrument: Instrument = IDEAL
     warnings: tuple[str, ...] = ()
+    stated: tuple[StatedAlbedo, ...] = ()
 
     __repr__ = brief
 

@@ -42,6 +42,7 @@ def of_unknown_scale(m: Measurements) -> Measurements:
         m,
         value=m.value / factor,
         sigma=None if m.sigma is None else np.where(m.valid, m.sigma / factor, 1.0),
+        stated=(),
         notes=(*m.notes, f"Scale unknown: values divided by {factor:.4g}; the scale is fitted."),
         instrument=dataclasses.replace(m.instrument, calibration=UNKNOWN_SCALE),
     )

@@ -137,6 +137,7 @@ class Examination:
                     "error": a.error[k],
                     "covered": a.covered,
                     "assumes_round_lobe": a.assumed,
+                    "stated": a.stated[k],
                 }
                 for a in self.albedos
             ],

@@ -4,7 +4,7 @@ It computes nothing; warnings are kept apart from description.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -34,6 +34,7 @@ def albedos(found: Sequence[ImpliedAlbedo], channels: Sequence[str]) -> Said:
                 "sample. Is it the BRDF in sr⁻¹, without cosine (a reflectance factor is π times larger), and is the "
                 "scale right?"
             )
+    said.warnings.extend(_contradictions(found, channels))
     listed = "; ".join(f"{_albedo(a)} at {say.degrees(a.theta_i)}" for a in found)
     share = say.span([a.covered for a in found], say.percent)
     assumed = [a for a in found if a.assumed]
@@ -46,6 +47,24 @@ def albedos(found: Sequence[ImpliedAlbedo], channels: Sequence[str]) -> Said:
         how += "; what lies beyond all samples is taken to be as bright as the nearest, and lies in the ± as a whole"
     said.lines.append(f"Implied albedo: {listed}{how}.")
     return said
+
+
+def _contradictions(found: Sequence[ImpliedAlbedo], channels: Sequence[str]) -> Iterator[str]:
+    """Where the file says another sum than that of its values, the worst channel of each incidence."""
+    doubted = [a for a in found if a.contradicted.any()]
+    if not doubted:
+        return
+    parts = []
+    for a in doubted:
+        k = int(np.nanargmax(np.where(a.contradicted, np.abs(a.value - a.stated), -np.inf)))
+        where = f" in {say.channels(channels[k : k + 1])}" if len(channels) > 1 else ""
+        added = with_error(float(a.value[k]), float(a.error[k]))
+        parts.append(f"{a.stated[k]:.3g} at {say.degrees(a.theta_i)}{where}, where they add up to {added}")
+    yield (
+        f"The file's own total integrated scatter (TIS) is not that of its values: {'; '.join(parts)}"
+        f"{_as_round(doubted[0]) if all(a.assumed for a in doubted) else ''}. Is it of another "
+        "quantity, as one without the cosine, or of other values?"
+    )
 
 
 def _as_round(a: ImpliedAlbedo) -> str:

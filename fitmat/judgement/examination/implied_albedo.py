@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from fitmat.judgement.examination.coverage import Incidence
+from fitmat.judgement.examination.coverage import SAME, Incidence
 from fitmat.measurements.samples import IN_PLANE, Measurements
 from fitmat.text import brief
 
@@ -29,7 +29,7 @@ PARTS = 4
 """Each side of a triangle, and twice this each interval of a curve, is divided into so many parts."""
 
 CERTAIN = 2.0
-"""An albedo is called larger than 1 if it exceeds 1 by so many times its uncertainty."""
+"""An albedo is called larger than 1, or another than the file says, if it is so by this many times its uncertainty."""
 
 
 class Rule(NamedTuple):
@@ -61,6 +61,7 @@ class ImpliedAlbedo:
             beyond the samples, (c,).
         covered: Share of the projected hemisphere between samples.
         assumed: Whether the lobe was taken to be round about the mirror direction, and the rest to be dark.
+        stated: What the file itself says of it, the mean over its rotations, (c,); NaN where it says nothing.
     """
 
     theta_i: float
@@ -68,6 +69,7 @@ class ImpliedAlbedo:
     error: Float[np.ndarray, " c"]
     covered: float
     assumed: bool
+    stated: Float[np.ndarray, " c"]
 
     __repr__ = brief
 
@@ -75,6 +77,11 @@ class ImpliedAlbedo:
     def too_large(self) -> np.ndarray:
         """Which channels reflect more than they receive, (c,)."""
         return np.nan_to_num(self.value - CERTAIN * self.error) > 1.0
+
+    @property
+    def contradicted(self) -> np.ndarray:
+        """Of which channels the file says another sum than theirs, (c,)."""
+        return np.abs(self.value - self.stated) > CERTAIN * self.error
 
 
 def implied_albedo(m: Measurements, sigma: Float[np.ndarray, "n c"], incidence: Incidence) -> ImpliedAlbedo | None:
@@ -107,7 +114,17 @@ def implied_albedo(m: Measurements, sigma: Float[np.ndarray, "n c"], incidence: 
         value[same], error[same] = _added(rule[0], m.value[np.ix_(rows, same)], sigma[np.ix_(rows, same)])
         if best is None or rule[0].covered > best[0].covered:
             best = rule
-    return best and ImpliedAlbedo(incidence.theta_i, value, error, best[0].covered, best[1])
+    stated = _stated(m, incidence.theta_i)
+    return best and ImpliedAlbedo(incidence.theta_i, value, error, best[0].covered, best[1], stated)
+
+
+def _stated(m: Measurements, theta_i: float) -> Float[np.ndarray, " c"]:
+    """What the file says of an incidence, per channel, the mean over the azimuths of the light."""
+    said = {
+        name: [s.value for s in m.stated if s.channel == name and abs(s.theta_i - theta_i) < SAME]
+        for name in m.channels
+    }
+    return np.array([np.mean(values) if values else np.nan for values in said.values()])
 
 
 def _rule(incidence: Incidence, usable: np.ndarray) -> tuple[Rule, bool] | None:

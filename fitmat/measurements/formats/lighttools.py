@@ -8,7 +8,9 @@ TristimulusValue above a line TIS, and below it one line for each azimuth and on
 light comes from azimuth 90°, so that the mirror direction is at 270°.
 """
 
+import dataclasses
 import os
+from collections.abc import Iterator
 
 import numpy as np
 import polars as pl
@@ -17,8 +19,8 @@ from jaxtyping import Bool, Float
 from fitmat.errors import ReadError
 from fitmat.maths.directions import from_angles
 from fitmat.measurements.parsing import blocks, contents
-from fitmat.measurements.parsing.recording import Recording, pivot
-from fitmat.measurements.samples import default_channels
+from fitmat.measurements.parsing.recording import Recording, channel_names, pivot
+from fitmat.measurements.samples import StatedAlbedo, default_channels
 
 LIGHT = 90.0
 """Azimuth of the light in such files, degrees."""
@@ -70,6 +72,7 @@ def load(path: str | os.PathLike[str]) -> Recording:
         notes=(*notes, *_conventions(front)),
     )
     labels = _labels(found, front, content)
+    long = dataclasses.replace(long, stated=tuple(_totals(found, front, aoi, labels)))
     return long if labels is None else pivot(long, np.repeat(labels, value[0].size))
 
 
@@ -117,6 +120,16 @@ def _labels(found: blocks.Sections, front: Bool[np.ndarray, " j"], content: str)
         return np.array([_TRISTIMULUS[word] for word in words])
     wavelength = _numbers(found, "wavelength", front)
     return wavelength if (wavelength > 0).all() else None
+
+
+def _totals(
+    found: blocks.Sections, front: Bool[np.ndarray, " j"], aoi: Float[np.ndarray, " f"], labels: np.ndarray | None
+) -> Iterator[StatedAlbedo]:
+    """The TIS of each block of the front side."""
+    names = default_channels(1) * len(aoi) if labels is None else channel_names(labels)
+    for theta_i, name, total in zip(aoi, names, found.totals(found.at("tis"))[front], strict=True):
+        if np.isfinite(total):
+            yield StatedAlbedo(float(theta_i), 0.0, name, float(total))
 
 
 def _conventions(front: Bool[np.ndarray, " j"]) -> tuple[str, ...]:

@@ -21,7 +21,7 @@ from fitmat.errors import OutputError, ReadError
 from fitmat.maths.directions import from_angles, zenith
 from fitmat.measurements.parsing import blocks, contents
 from fitmat.measurements.parsing.recording import HORIZON, Recording
-from fitmat.measurements.samples import Measurements, default_channels
+from fitmat.measurements.samples import Measurements, StatedAlbedo, default_channels
 
 CHANNELS = {"monochrome": default_channels(1), "xyz": ("x", "y", "z"), "rgb": ("r", "g", "b")}
 """SpectralContent → channels; RGB is not in the specification, but written by instruments."""
@@ -79,6 +79,7 @@ def load(path: str | os.PathLike[str]) -> Recording:
         channels=channels,
         doubts={reason: doubt.reshape(-1, len(channels)) for reason, doubt in doubts.items()},
         notes=(*notes, *_conventions(len(angles[0]))),
+        stated=tuple(_stated(found, angles[0], angles[1], channels)),
     )
 
 
@@ -146,6 +147,16 @@ def _values(found: blocks.Sections, shape: list[int], channels: tuple[str, ...])
         raise ReadError(f"{found.heads.source}: {got}, expected {', '.join(channels)}. Sort its blocks.")
     number = found.blocks(rows, size, f"{shape[2]} azimuths × {shape[3]} radial angles")
     return np.moveaxis(number.reshape(len(channels), *shape), 0, -1)
+
+
+def _stated(
+    found: blocks.Sections, rotation: np.ndarray, theta_i: np.ndarray, channels: tuple[str, ...]
+) -> Iterator[StatedAlbedo]:
+    """The TIS of each block, in the order of `_values`."""
+    total = found.totals(found.at("tis")).reshape(len(channels), len(rotation), len(theta_i))
+    for channel, turned, lit in zip(*np.nonzero(np.isfinite(total)), strict=True):
+        value = float(total[channel, turned, lit])
+        yield StatedAlbedo(float(theta_i[lit]), float(rotation[turned]), channels[channel], value)
 
 
 def _conventions(rotations: int) -> Iterator[str]:

@@ -173,6 +173,11 @@ class Sections:
         inside[rows] = True
         return self.number[np.repeat(inside, np.diff(self.start))].reshape(-1, size)
 
+    def totals(self, rows: Int[np.ndarray, " j"]) -> Float[np.ndarray, " j"]:
+        """The numbers beside keywords that state what a block adds up to; NaN where none does, or none above 0."""
+        stated = self.rest.gather(rows).cast(pl.Float64, strict=False).fill_null(np.nan).to_numpy()
+        return np.where(stated > 0, stated, np.nan)
+
     def refuse_numbers_outside(self, *keys: str) -> None:
         """Stop at numbers below any other keyword.
 

@@ -10,6 +10,7 @@ import polars as pl
 from jaxtyping import Bool, Float
 
 from fitmat.measurements.parsing.angles import ROUNDING
+from fitmat.measurements.samples import StatedAlbedo
 from fitmat.text import brief
 
 HORIZON = np.sin(ROUNDING)
@@ -47,6 +48,7 @@ class Recording:
         distinct: Whether no geometry can occur twice, because the format is a grid.
         unsaid_side: The flag that exchanges the mirror side and the light's, and the one that confirms them; empty
             where format or user has settled which is which.
+        stated: What the file says that its values add up to.
     """
 
     source: str
@@ -60,6 +62,7 @@ class Recording:
     notes: tuple[str, ...] = ()
     distinct: bool = False
     unsaid_side: tuple[str, ...] = ()
+    stated: tuple[StatedAlbedo, ...] = ()
 
     __repr__ = brief
 
@@ -97,8 +100,13 @@ def pivot(long: Recording, labels: np.ndarray) -> Recording:
         value=spread(long.value, np.nan),
         sigma=None if long.sigma is None else spread(long.sigma, np.nan),
         doubts=absent | {reason: spread(doubt, False) for reason, doubt in long.doubts.items()},
-        channels=tuple(f"{name:.10g}" if labels.dtype.kind == "f" else str(name) for name in names[order]),
+        channels=channel_names(names[order]),
     )
+
+
+def channel_names(labels: np.ndarray) -> tuple[str, ...]:
+    """Wavelengths, or texts, as names of channels."""
+    return tuple(f"{label:.10g}" if labels.dtype.kind == "f" else str(label) for label in labels)
 
 
 def sentinels(value: Float[np.ndarray, "n c"]) -> dict[str, Bool[np.ndarray, "n c"]]:
