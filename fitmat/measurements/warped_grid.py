@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from fitmat.errors import ModelError
 from fitmat.maths.directions import from_angles, zenith
-from fitmat.maths.warp import Blend, Cell, Warp
+from fitmat.maths.warp import EDGE, Blend, Cell, Warp
 from fitmat.text import brief
 
 UNIT = 1e-6
@@ -126,10 +126,11 @@ class RGLMaterial:
         flags = (np.zeros(number, bool) for _ in range(2))
         nodes = Nodes(np.empty((number, 3)), np.empty((number, 3)), np.empty((number, channels)), *flags)
         rows = max(1, _BLOCK // (channels + 16))
+        azimuths = self._azimuths()
         for start in range(0, number, rows):
             block = slice(start, min(start + rows, number))
             chosen, y, x = np.unravel_index(np.arange(block.start, block.stop), (slices, height, width))
-            theta_i, phi_i = self.theta_i[chosen % len(self.theta_i)], self.phi_i[chosen // len(self.theta_i)]
+            theta_i, phi_i = self.theta_i[chosen % len(self.theta_i)], azimuths[chosen // len(self.theta_i)]
             at = self.vndf.sample(np.stack([x / (width - 1), y / (height - 1)], axis=1), Blend.only(chosen))
             theta_h, phi_h = np.pi / 2 * at[:, 0] ** 2, 2 * np.pi * at[:, 1] - np.pi
             wi, h = from_angles(theta_i, phi_i), from_angles(theta_h, phi_h + (phi_i if self.isotropic else 0.0))
@@ -141,6 +142,15 @@ class RGLMaterial:
             nodes.empty[block] = self.vndf.empty[chosen]
             nodes.unseen[block] = self.jacobian & (self._area(theta_i, phi_i) <= 0)
         return nodes
+
+    def _azimuths(self) -> Float[np.ndarray, " p"]:
+        """`phi_i`, the outermost just within their range, where the published code finds their own slices.
+
+        π in single precision lies beyond π: the light would be across the seam, or across a plane of symmetry.
+        """
+        if self.isotropic:
+            return self.phi_i
+        return np.clip(self.phi_i, max(self.phi_i[0], -np.pi) + EDGE, min(self.phi_i[-1], np.pi) - EDGE)
 
     def _folded(self, wi: np.ndarray, wo: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Both directions turned or mirrored so that the light is at an azimuth of incidence that was measured."""
