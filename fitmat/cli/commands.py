@@ -1,12 +1,11 @@
 """The command line: parse, one library call, print. The only room that speaks."""
 
-import warnings
 from pathlib import Path
 from typing import Any
 
 import typer
 
-from fitmat.cli import interrupts, process
+from fitmat.cli import process
 from fitmat.cli.flags.cache import ClearFlag
 from fitmat.cli.flags.design import CountFlag, ForFlag, KindFlag
 from fitmat.cli.flags.files import (
@@ -118,49 +117,17 @@ def fit(
 
     with session.watch() as watch:
         process.set_up()
-        from fitmat.maths import program_files, programs
+        from fitmat.maths import programs
 
         programs.load_ahead()
-        from fitmat import files
-        from fitmat.fitting import priors
-        from fitmat.models.parameters import assignments
-        from fitmat.reports import page, terminal
-        from fitmat.studies.study import forget, study
+        from fitmat.cli import fit
 
-        fixed, believed = assignments(fix or [], "--fix"), priors.assignments(prior or [])
-        told = {"loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
-        target = out or files.default(file)
-        with (
-            interrupts.taken_away(files.new(target, own=page.own, force=force), files.abandon) as draft,
-            programs.announced(watch.compiling),
-        ):
-            measurements = session.source(file, reading | {"instrument": instrument}, watch)
-            found = study(
-                measurements,
-                models,
-                fixed=fixed,
-                priors=believed,
-                sampling=not no_mcmc,
-                second_opinion=check_posterior,
-                full=full,
-                resume=files.resumed(target),
-                progress=watch,
-                **told,
-            )
-            watch("writing the report", 0, 0)
-            missing = page.write(draft, found)
-        programs.remember()
-    if not no_mcmc:
-        forget(files.resumed(target))
-    if json_:
-        process.say((target / "fit.json").read_text(encoding="utf-8").rstrip("\n"))
-    else:
-        terminal.show(found, target / (page.PAGE if (target / page.PAGE).exists() else page.RECORD))
-    if missing:
-        process.say(f"{target}: {missing}", err=True)
-    if (kept := program_files.kept()).why:
-        process.say(kept.words, err=True)
-    if any(p.fit.result != "converged" or p.interrupted for p in found.posteriors):
+        told = {"models": models, "loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
+        told |= fit.known(fix or [], prior or [])
+        told |= {"sampling": not no_mcmc, "second_opinion": check_posterior, "full": full}
+        done = fit.write_report(file, out, reading | {"instrument": instrument}, told, watch, force=force)
+    done.tell(as_json=json_)
+    if not done.converged:
         raise typer.Exit(NOT_CONVERGED)
 
 
@@ -194,12 +161,7 @@ def simulate(
     if catalogue is not None:
         written = simulate.write_catalogue(catalogue, force=force)
     else:
-        angles = (
-            simulate.angles(theta_i, "--theta-i", lowest=0.0),
-            simulate.angles(theta_o, "--theta-o"),
-            simulate.angles(phi, "--phi", lowest=0.0, highest=360.0),
-            simulate.angles(phi_i, "--phi-i", lowest=0.0, highest=360.0),
-        )
+        angles = simulate.grid(theta_i, theta_o, phi, phi_i)
         truth = simulate.truth(model, set_ or [], masking)
         written = simulate.write_simulation(
             out, truth, angles, noise=(noise, floor, seed), instrument=instrument, force=force
@@ -251,14 +213,9 @@ def convert(
 ) -> None:
     """Write measurements in another format; what that cannot hold is said."""
     process.refuse_little_memory()
-    from fitmat.measurements import writing
-    from fitmat.measurements.reader import read
+    from fitmat.cli import convert
 
-    measurements = read(file, **reading)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        writing.write(measurements, out, force=force)
-    process.say("\n".join([str(measurements), *writing.losses(measurements, out), visible(str(out))]))
+    process.say("\n".join([*convert.written(file, reading, out, force=force), visible(str(out))]))
 
 
 @app.command(cls=Command)
@@ -307,16 +264,12 @@ def design(
         from fitmat.cli import design
         from fitmat.maths import programs
         from fitmat.measurements.reader import read
-        from fitmat.models.parameters import assignments
         from fitmat.reports.pictures import refuse_picture
-        from fitmat.studies.plan import plan
-        from fitmat.studies.study import fit_each
 
         refuse_picture(plot, force=force)
         measurements = read(file, **reading, instrument=instrument)
-        jobs = plan(models, measurements, fixed=assignments(fix or [], "--fix"))
         with programs.announced(watch.compiling):
-            posteriors = fit_each(measurements, jobs, seed=seed, progress=watch)
+            posteriors = design.fitted(measurements, models, fix or [], seed, watch)
             watch("looking for the next angles", 0, 0)
             found = design.propose(posteriors, for_, kind=kind, count=count)
     process.say(design.as_json(found) if json_ else design.as_text(found))

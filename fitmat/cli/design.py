@@ -10,14 +10,38 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 
+from fitmat._types import Progress
 from fitmat.judgement.design.design import MATCH, Design, Proposal, next_angles
 from fitmat.match.match import is_microfacet
+from fitmat.measurements.samples import Measurements
+from fitmat.models.parameters import assignments
 from fitmat.reports.pictures import write_picture
+from fitmat.studies.plan import plan
+from fitmat.studies.study import fit_each
 from fitmat.text import plain, text_table
 from fitmat.uncertainty.posterior import Posterior
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+def fitted(
+    measurements: Measurements, models: str, fixed: Sequence[str], seed: int, progress: Progress
+) -> list[Posterior]:
+    """The posteriors around which the next measurements are looked for.
+
+    Args:
+        measurements: From `fitmat.read`.
+        models: Names, with commas between them.
+        fixed: What `--fix` says.
+        seed: Of the draws.
+        progress: Called with what is done next.
+
+    Raises:
+        FitmatError: as `fitmat.fit`.
+    """
+    jobs = plan(models, measurements, fixed=assignments(fixed, "--fix"))
+    return fit_each(measurements, jobs, seed=seed, progress=progress)
 
 
 def propose(

@@ -51,6 +51,16 @@ def angles(text: str, option: str, *, lowest: float = -90.0, highest: float = 90
     return found
 
 
+def grid(theta_i: str, theta_o: str, phi: str, phi_i: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The angles of the four options of that name, in degrees; errors as `angles`."""
+    return (
+        angles(theta_i, "--theta-i", lowest=0.0),
+        angles(theta_o, "--theta-o"),
+        angles(phi, "--phi", lowest=0.0, highest=360.0),
+        angles(phi_i, "--phi-i", lowest=0.0, highest=360.0),
+    )
+
+
 def truth(name: str | None, settings: Sequence[str], masking: str | None) -> AbstractBRDF:
     """The model to simulate; lists of values make it a model of several channels.
 

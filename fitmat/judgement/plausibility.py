@@ -7,6 +7,7 @@ out; they break laws by right.
 import numpy as np
 
 from fitmat.fitting.result import Fit
+from fitmat.maths.directions import mirror
 from fitmat.models.albedo import albedo
 from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF
@@ -52,7 +53,7 @@ def _reciprocal(model: AbstractBRDF) -> bool:
     sin = np.sqrt(1.0 - cos**2)
     w = np.stack([sin * np.cos(phi), sin * np.sin(phi), cos], axis=1)
     wi, wo = w[::2], w[1::2].copy()
-    wo[::2] = (wi * [-1.0, -1.0, 1.0])[::2] + np.array([0.0, 0.0, 0.02])
+    wo[::2] = mirror(wi)[::2] + np.array([0.0, 0.0, 0.02])
     wo /= np.linalg.norm(wo, axis=1, keepdims=True)
     there, back = np.split(at(model, np.concatenate([wi, wo]), np.concatenate([wo, wi])), 2)
     return bool(np.all(np.abs(there - back) <= ROUNDING * (np.abs(there) + np.abs(back))))

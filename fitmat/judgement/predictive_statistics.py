@@ -12,6 +12,7 @@ from jaxtyping import Float
 from fitmat.fitting.result import Fit
 from fitmat.judgement.prediction import replicated
 from fitmat.maths import binomial, normal
+from fitmat.maths.directions import mirror
 from fitmat.measurements.incidences import Incidence
 from fitmat.measurements.neighbours import curves
 from fitmat.text import brief
@@ -146,10 +147,10 @@ class Replicates:
     def sides(self) -> Iterator[Statistic]:
         """The mean residual around the mirror direction, on the light's side and on the far side of each incidence."""
         wi, wo = np.asarray(self.fit.data.wi), np.asarray(self.fit.data.wo)
-        mirror = np.sum(wi * [-1.0, -1.0, 1.0] * wo, axis=1) > np.cos(NEAR_MIRROR)
+        near = np.sum(mirror(wi) * wo, axis=1) > np.cos(NEAR_MIRROR)
         light = np.sum(wi[:, :2] * wo[:, :2], axis=1) > 0
-        parts = {"around the mirror direction": mirror, "towards the light": light & ~mirror,
-            "away from the light": ~light & ~mirror}  # fmt: skip
+        parts = {"around the mirror direction": near, "towards the light": light & ~near,
+            "away from the light": ~light & ~near}  # fmt: skip
         for group in self.groups:
             for name, part in parts.items():
                 rows = group.rows[part[group.rows]]

@@ -109,9 +109,9 @@ def rotated(w: Float[Any, "3"], angle: Float[Any, ""]) -> Float[Any, "3"]:
     return xp.stack([cos * w[0] - sin * w[1], sin * w[0] + cos * w[1], w[2]])
 
 
-def mirror(direction: Vec3) -> Vec3:
-    """The mirror direction 2(n·ω)n − ω."""
-    return direction * np.array([-1.0, -1.0, 1.0])
+def mirror(directions: Float[Any, "*n 3"]) -> Float[Any, "*n 3"]:
+    """The mirror directions 2(n·ω)n − ω, of one direction or of many."""
+    return directions * np.array([-1.0, -1.0, 1.0])
 
 
 def above(wi: Vec3, wo: Vec3) -> Bool[Array, ""]:

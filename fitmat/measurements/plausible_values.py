@@ -6,6 +6,7 @@ It converts nothing: logarithms and percent are doubted, never assumed.
 import numpy as np
 
 from fitmat.errors import ReadError
+from fitmat.maths.directions import mirror
 from fitmat.measurements.options import Options
 from fitmat.measurements.samples import Measurements
 
@@ -56,7 +57,7 @@ def _refuse_logarithms(value: np.ndarray, where: str) -> None:
 
 def _diffuse(m: Measurements) -> np.ndarray:
     """Which samples stand away from the mirror direction, from the light and from grazing angles, (n,)."""
-    beside_mirror = np.sum(m.wi * [-1.0, -1.0, 1.0] * m.wo, axis=1) > np.cos(AWAY)
+    beside_mirror = np.sum(mirror(m.wi) * m.wo, axis=1) > np.cos(AWAY)
     beside_light = np.sum(m.wi * m.wo, axis=1) > np.cos(BACK)
     return ~beside_mirror & ~beside_light & (np.minimum(m.wi[:, 2], m.wo[:, 2]) > np.cos(UPRIGHT))
 

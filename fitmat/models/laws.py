@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from fitmat.maths.directions import mirror
 from fitmat.maths.programs import program
 from fitmat.models.albedo import albedo
 from fitmat.models.base import AbstractBRDF
@@ -138,7 +139,7 @@ def _pairs(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     cos, phi = rng.uniform(size=(2, 2 * PAIRS))
     sin = np.sqrt(1.0 - cos**2)
     wi, wo = np.split(np.stack([sin * np.cos(2 * np.pi * phi), sin * np.sin(2 * np.pi * phi), cos], axis=1), 2)
-    near = wi * [-1.0, -1.0, 1.0] + 0.02 * rng.normal(size=wi.shape)
+    near = mirror(wi) + 0.02 * rng.normal(size=wi.shape)
     near[:, 2] = np.abs(near[:, 2])
     wo[: PAIRS // 4] = (near / np.linalg.norm(near, axis=1, keepdims=True))[: PAIRS // 4]
     return wi, wo
@@ -161,16 +162,15 @@ def singular() -> dict[str, tuple[np.ndarray, np.ndarray]]:
         return np.array([sin * np.cos(phi), sin * np.sin(phi), cos])
 
     normal, oblique, flat, almost = at(1, 0), at(0.6, 1.0), at(0, 0.3), at(1e-12, 0.3)
-    reverse = np.array([-1.0, -1.0, 1.0])
     return {
         "normal incidence": (normal, oblique),
         "both along the normal": (normal, normal),
         "retro-reflection": (oblique, oblique),
-        "mirror, h = n": (oblique, oblique * reverse),
+        "mirror, h = n": (oblique, mirror(oblique)),
         "light at cos 0": (flat, oblique),
         "light at cos 1e-12": (almost, oblique),
         "sensor at cos 1e-12": (oblique, almost),
-        "both at cos 1e-12, forward": (almost, almost * reverse),
+        "both at cos 1e-12, forward": (almost, mirror(almost)),
         "both at cos 1e-12, backward": (almost, almost),
         "both at cos 1e-12, across": (almost, at(1e-12, 1.9)),
         "wi = -wo at the horizon": (flat, -flat),

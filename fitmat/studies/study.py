@@ -3,7 +3,6 @@
 What people see of it, `reports` makes; nothing is written or printed here.
 """
 
-import contextlib
 import dataclasses
 import os
 from collections.abc import Mapping, Sequence
@@ -14,7 +13,7 @@ import numpy as np
 from jaxtyping import ArrayLike
 
 from fitmat import arguments
-from fitmat._types import SAMPLING, Progress
+from fitmat._types import Progress
 from fitmat.errors import ModelError
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.streamed import fit_from, fit_part, rows
@@ -29,9 +28,9 @@ from fitmat.measurements.samples import Measurements
 from fitmat.models.around.tilt import Tilted
 from fitmat.studies.findings import Findings, find
 from fitmat.studies.plan import DEFAULT_MODELS, Jobs, plan, refuse_unsampled
+from fitmat.studies.sampling import sample_each
 from fitmat.text import brief
-from fitmat.uncertainty import checkpoint, second_sampler
-from fitmat.uncertainty.chains import resumable_steps, sample
+from fitmat.uncertainty import second_sampler
 from fitmat.uncertainty.laplace import laplace, laplace_each
 from fitmat.uncertainty.posterior import Posterior
 
@@ -155,7 +154,7 @@ def study(
     else:
         first = _pass_over(stream, jobs, seed, say)
     walking = sampling and first[0].fit.loss.posterior and first[0].fit.n_values <= MOST_SAMPLED
-    posteriors = _sample_each(first, seed, resume, say) if walking else first
+    posteriors = sample_each(first, seed=seed, resume=resume, progress=say) if walking else first
     return judge(posteriors, seed=seed, second_opinion=second_opinion, full=full, progress=say)
 
 
@@ -198,39 +197,6 @@ def _pass_over(stream: Stream, jobs: Jobs, seed: int, say: Progress) -> list[Pos
 
         found.append(laplace(fit_from(every, start, passing), seed=seed))
     return found
-
-
-def _sample_each(first: Sequence[Posterior], seed: int, resume: Path | None, say: Progress) -> list[Posterior]:
-    """Sample one fit after the other; after an interrupt, and for fits that are not finite, Laplace's draws stay."""
-    posteriors: list[Posterior] = []
-    for approximate in first:
-        fit = approximate.fit
-        if not fit.finite or any(posterior.interrupted for posterior in posteriors):
-            posteriors.append(approximate)
-            continue
-        kept = None if resume is None else resume / fit.name
-        steps = 0 if kept is None else _resumable(approximate, seed, kept)
-        say(f"{SAMPLING} {fit.name}{f', resumed at step {steps:,}' if steps else ''}", steps, 0)
-        posteriors.append(sample(fit, seed=seed, progress=say, checkpoint=kept))
-    return posteriors
-
-
-def _resumable(approximate: Posterior, seed: int, kept: Path) -> int:
-    """The step from which a run goes on; checkpoints of another run make way."""
-    if not kept.exists():
-        return 0
-    steps = resumable_steps(approximate.fit, seed=seed, checkpoint=kept)
-    if not steps:
-        checkpoint.discard(kept)
-    return steps
-
-
-def forget(resume: Path) -> None:
-    """Remove what `study` kept to go on from, which has served; what it did not write stays."""
-    with contextlib.suppress(OSError):
-        for kept in resume.iterdir():
-            checkpoint.discard(kept)
-        resume.rmdir()
 
 
 def judge(

@@ -297,7 +297,7 @@ def reached(monkeypatch: pytest.MonkeyPatch) -> list[Measurements]:
         arrived.append(measurements)
         raise FitmatError("arrived")
 
-    monkeypatch.setattr("fitmat.studies.study.study", study)
+    monkeypatch.setattr("fitmat.cli.fit.study", study)
     return arrived
 
 

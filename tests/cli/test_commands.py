@@ -18,6 +18,7 @@ import pytest
 
 from fitmat._types import Progress
 from fitmat.cli.main import main
+from fitmat.studies import sampling
 from fitmat.studies import study as room
 from fitmat.uncertainty.chains import CHUNK
 
@@ -332,7 +333,7 @@ def test_same_seed_same_numbers(run, tmp_path):
 
 
 def test_interrupted_sampling_keeps_what_is_done(run, tmp_path, monkeypatch):
-    sample = room.sample
+    sample = sampling.sample
 
     def interrupted(found: Any, *, seed: int, progress: Progress, checkpoint: Path) -> Any:
         def tick(what: str, done: int, total: int) -> None:
@@ -341,7 +342,7 @@ def test_interrupted_sampling_keeps_what_is_done(run, tmp_path, monkeypatch):
 
         return sample(found, seed=seed, progress=tick, checkpoint=checkpoint)
 
-    monkeypatch.setattr(room, "sample", interrupted)
+    monkeypatch.setattr(sampling, "sample", interrupted)
     ended = run("fit", DATA / "sparse.csv", "--models", "lambert,lambert+phong", "--out", tmp_path / "out")
     assert ended.code == 3
     assert beside_progress(ended.err) == ""

@@ -16,6 +16,7 @@ from fitmat.fitting import information, streamed
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.likelihood import log_density, prepare
 from fitmat.fitting.result import Fit
+from fitmat.fitting.streamed_steps import Range
 from fitmat.fitting.streamed_sums import Sums, block_sums
 from fitmat.measurements.formats import csv
 from fitmat.measurements.instrument import Instrument
@@ -127,9 +128,7 @@ def test_a_far_start_ends_in_the_same_place(scanned: Chunks, found: Fit, monkeyp
     def elsewhere(file: Any, around: Any) -> Any:
         far = with_vector(file.start.model, np.array([0.2, 0.1, 30.0]))
         expected = information.expected_information(far, file.start.data, 0.01)
-        return climb(
-            file, streamed._Range(dataclasses.replace(file.start, model=far, discrepancy=0.01, information=expected))
-        )
+        return climb(file, Range(dataclasses.replace(file.start, model=far, discrepancy=0.01, information=expected)))
 
     def noted(*args: Any) -> Sums:
         result = sums(*args)
@@ -138,7 +137,7 @@ def test_a_far_start_ends_in_the_same_place(scanned: Chunks, found: Fit, monkeyp
 
     monkeypatch.setattr(streamed, "PASSES", 40)
     monkeypatch.setattr(streamed, "_climb", elsewhere)
-    monkeypatch.setattr(streamed._Range, "second_order", lambda *_: 0.0)  # steps too long, so that some are taken back
+    monkeypatch.setattr(Range, "second_order", lambda *_: 0.0)  # steps too long, so that some are taken back
     monkeypatch.setattr(streamed._File, "sums", noted)
     far = streamed.fit_chunks(scanned, MODEL)
     assert len(costs) > 5
@@ -205,7 +204,7 @@ def test_too_few_passes_are_named(coloured: Chunks, monkeypatch: pytest.MonkeyPa
 
 def _climber(scanned: Chunks) -> Any:
     start = fm.fit(scanned.part, "lambert")
-    return streamed._File(streamed.rows(scanned), start, None), streamed._Range(start)
+    return streamed._File(streamed.rows(scanned), start, None), Range(start)
 
 
 @pytest.mark.study

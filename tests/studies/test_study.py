@@ -16,6 +16,7 @@ from fitmat.models.simulation import simulate
 from fitmat.reports import page, terminal
 from fitmat.studies import findings, record
 from fitmat.studies import study as room
+from fitmat.studies.sampling import forget
 from fitmat.studies.study import DETAILED, Study, judge, study
 from fitmat.uncertainty.posterior import Posterior
 
@@ -215,9 +216,9 @@ def test_what_a_run_kept_to_go_on_is_removed_and_nothing_else(tmp_path: Path) ->
         (tmp_path / "x.resume" / model / "00000050.part").touch()
     notes = tmp_path / "x.resume" / "mine.txt"
     notes.write_text("mine")
-    room.forget(tmp_path / "x.resume")
+    forget(tmp_path / "x.resume")
     assert list(notes.parent.iterdir()) == [notes]
     notes.unlink()
-    room.forget(tmp_path / "x.resume")
-    room.forget(tmp_path / "x.resume")
+    forget(tmp_path / "x.resume")
+    forget(tmp_path / "x.resume")
     assert list(tmp_path.iterdir()) == []

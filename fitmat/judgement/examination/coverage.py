@@ -8,7 +8,7 @@ import dataclasses
 import numpy as np
 from jaxtyping import Bool, Float
 
-from fitmat.maths.directions import zenith
+from fitmat.maths.directions import mirror, zenith
 from fitmat.measurements.samples import IN_PLANE, Measurements
 from fitmat.text import brief
 
@@ -167,7 +167,7 @@ def mirror_frame(wi: np.ndarray, wo: np.ndarray) -> Float[np.ndarray, "n 3"]:
 
 def from_mirror(wi: np.ndarray, wo: np.ndarray) -> Float[np.ndarray, " n"]:
     """Angle between wo and the mirror direction of wi, radians, exact for small angles."""
-    chord = np.linalg.norm(wo - wi * np.array([-1.0, -1.0, 1.0]), axis=1)
+    chord = np.linalg.norm(wo - mirror(wi), axis=1)
     return 2.0 * np.arcsin(np.clip(chord / 2.0, 0.0, 1.0))
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from fitmat.errors import ReadError
-from fitmat.maths.directions import from_angles
+from fitmat.maths.directions import from_angles, mirror
 from fitmat.measurements.parsing import blocks, contents
 from fitmat.measurements.parsing.recording import Recording
 from fitmat.measurements.samples import default_channels
@@ -29,7 +29,6 @@ ANGLES = {
 
 _LIMIT = {"deg": 360.0, "rad": 2 * np.pi, "sin": 1.0}
 _ROUNDING = 1e-6
-_MIRRORED = np.array([-1.0, -1.0, 1.0])
 _SECOND = 2
 
 
@@ -59,14 +58,14 @@ def load(path: str | os.PathLike[str]) -> Recording:
     start = np.cumsum(count) - count
     spec, scat = start[count == 2], start[count == 3]
     block = (np.cumsum(count == 2) - 1)[count == 3]
-    mirror = _directions(body.keep(count == 2), number[spec], number[spec + 1], unit)
+    specular = _directions(body.keep(count == 2), number[spec], number[spec + 1], unit)
     wo = _directions(body.keep(count == 3), number[scat], number[scat + 1], unit)
     with np.errstate(over="ignore"):
         value = scale * number[scat + 2][:, None]
     return Recording(
         source=source,
-        wi=mirror[block],
-        wo=wo * _MIRRORED,
+        wi=specular[block],
+        wo=mirror(wo),
         value=value,
         quantity="brdf",
         channels=default_channels(1),

@@ -21,8 +21,7 @@ from fitmat.measurements.large.stream import CHUNK, PART, is_kept
 from fitmat.measurements.options import Options
 from fitmat.measurements.parsing import contents, tabular
 from fitmat.measurements.parsing.angles import as_stated
-from fitmat.measurements.parsing.columns import Columns, assign
-from fitmat.measurements.parsing.constants import with_constants
+from fitmat.measurements.parsing.columns import Columns
 from fitmat.measurements.parsing.recording import Recording, named
 from fitmat.measurements.parsing.table import Table
 from fitmat.measurements.peak_side import with_peak_side
@@ -116,14 +115,13 @@ def scan(
     lenient = whole = dataclasses.replace(options, where=None)  # rows are chosen here
     look = FirstPass(part)
     for table in _chosen(path, rows, options.where):
-        whole_table = with_constants(table, columns, options.constants)
-        layout = assign(whole_table, columns, options.quantity)
+        whole_table, layout = tabular.laid_out(table, columns, whole)
         _refuse_long(table, layout)
         # One chunk may hold small angles only; whether all do is asked at the end.
         stated = as_stated(whole_table, layout.angles, whole)
         lenient = stated.with_units({name: stated.unit(name) or "degrees" for name in layout.angles})
         angles = {name: column for name, column in layout.angles.items() if column < len(table.names)}
-        look.add(tabular.recording(table, columns, lenient), table, angles)
+        look.add(tabular.recorded(whole_table, layout, lenient), table, angles)
         if progress is not None:
             progress("reading", look.n_samples, 0)
     if look.extremes is not None:

@@ -32,8 +32,17 @@ def recording(table: Table, columns: str | Mapping[str, str | int] | None, optio
     """
     if options.where is not None:
         table = table.chosen(options.where)
-    table = with_constants(table, columns, options.constants)
-    layout = assign(table, columns, options.quantity)
+    return recorded(*laid_out(table, columns, options), options)
+
+
+def laid_out(table: Table, columns: str | Mapping[str, str | int] | None, options: Options) -> tuple[Table, Columns]:
+    """The table with a column for each constant, and what its columns mean; arguments and errors as `recording`."""
+    whole = with_constants(table, columns, options.constants)
+    return whole, assign(whole, columns, options.quantity)
+
+
+def recorded(table: Table, layout: Columns, options: Options) -> Recording:
+    """The recording of a table whose columns are known, from `laid_out`; errors as `recording`."""
     angles, assumed = directions(table, layout.angles, options)
     theta_i, phi_i, theta_o, phi_o = angles.T
     scale = _scale(table, layout, options)

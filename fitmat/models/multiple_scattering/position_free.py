@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Bool, Float, Int, PRNGKeyArray
 
 from fitmat.errors import ModelError
-from fitmat.models.multiple_scattering.random_walk import (
+from fitmat.models.multiple_scattering.paths import (
     GENERATOR,
     MonteCarlo,
     Orders,

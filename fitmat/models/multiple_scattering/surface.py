@@ -1,6 +1,6 @@
 """The Smith micro-surface as a half space: extinction, phase functions of its facets, and samples of them.
 
-Knows single collisions and flights only; what paths they make up is for `random_walk` and `position_free`.
+Knows single collisions and flights only; what paths they make up is for `paths`, `random_walk` and `position_free`.
 
 Heights h enter as the depth t = −ln C1(h) ≥ 0 alone, so that their distribution does not matter: along ω the surface
 is a half space t > 0 with the extinction Λ(ω) per unit t upwards and 1 + Λ(−ω) downwards (E. Heitz, J. Hanika,

@@ -16,9 +16,10 @@ from fitmat.maths.directions import from_angles
 from fitmat.maths.quadrature import lobe_rule
 from fitmat.models.base import evaluate
 from fitmat.models.lobes.microfacet import Microfacet
-from fitmat.models.multiple_scattering import random_walk
+from fitmat.models.multiple_scattering import paths
+from fitmat.models.multiple_scattering.paths import MonteCarlo
 from fitmat.models.multiple_scattering.position_free import Depths, Flight, evaluate_slab, fly
-from fitmat.models.multiple_scattering.random_walk import MonteCarlo, albedo_walk, evaluate_walk
+from fitmat.models.multiple_scattering.random_walk import albedo_walk, evaluate_walk
 from fitmat.models.multiple_scattering.surface import (
     Surface,
     _beckmann_slopes,
@@ -296,7 +297,7 @@ def test_cut_paths_are_counted(estimator: Estimator, monkeypatch: pytest.MonkeyP
     """Two collisions at most: the value is the sum of two orders, and the energy missing in it is stated."""
     surface = Surface(GGX(), (1.0, 1.0), Mirrors())
     orders = [estimator(surface, WI, WO, samples=SAMPLES, seed=k, order=k) for k in (1, 2)]
-    monkeypatch.setattr(random_walk, "MOST_BOUNCES", 2)
+    monkeypatch.setattr(paths, "MOST_BOUNCES", 2)
     found = estimator(surface, WI, WO, samples=SAMPLES, seed=3)
     error = np.linalg.norm([found.standard_error, *[part.standard_error for part in orders]], axis=0)
     assert (np.abs(found.value - orders[0].value - orders[1].value) <= SIGMAS * error).all()
