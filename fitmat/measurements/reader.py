@@ -15,7 +15,21 @@ from fitmat import arguments
 from fitmat.errors import ReadError
 from fitmat.measurements import joining
 from fitmat.measurements.blocked import without_blocked
-from fitmat.measurements.formats import alta, astm, excel, fred, lighttools, merl, parquet, rgl, ssdd, utia, zemax
+from fitmat.measurements.formats import (
+    alta,
+    astm,
+    excel,
+    fred,
+    lighttools,
+    merl,
+    pab_opto,
+    parquet,
+    rgl,
+    road,
+    ssdd,
+    utia,
+    zemax,
+)
 from fitmat.measurements.instrument import IDEAL, Instrument
 from fitmat.measurements.options import Options
 from fitmat.measurements.parsing import cells, contents, frames, tabular
@@ -27,9 +41,12 @@ from fitmat.measurements.quantity import factor, note
 from fitmat.measurements.samples import Measurements
 from fitmat.measurements.scale import of_unknown_scale
 
-FORMATS: tuple[Any, ...] = (rgl, merl, zemax, lighttools, fred, astm, alta, ssdd, utia)
+FORMATS: tuple[Any, ...] = (rgl, merl, zemax, lighttools, fred, astm, alta, ssdd, road, pab_opto, utia)
 """Rooms of one format each, asked in this order: `claims(head, size)` says whether a file is theirs, `load(path)` makes
 the `Recording`; what none claims is a text table."""
+
+TABLES = (pab_opto,)
+"""Those that are text tables too: where the user says what the columns are, they are read as such."""
 
 EXCHANGED = "theta_i=phi_i,phi_i=theta_i,theta_o=phi_o,phi_o=theta_o"
 
@@ -204,7 +221,7 @@ def _of_file(
 ) -> Recording:
     head, size = contents.contents(path, contents.HEAD), contents.size(path)
     layout = next((layout for layout in FORMATS if layout.claims(head, size)), None)
-    if layout is None:
+    if layout is None or (columns and layout in TABLES):
         room = next((room for room in (parquet, excel) if room.claims(head, size)), cells)
         return tabular.recording(room.load(path), columns, options)
     _refuse_needless(contents.name(path), layout.__name__.rpartition(".")[2], columns, options)

@@ -19,7 +19,7 @@ FileFlag = Annotated[
     Path,
     typer.Argument(
         help="Measurements: CSV or any text table (also .gz), Parquet, Excel, MERL, RGL, Zemax, LightTools, FRED, "
-        "ASTM, UTIA, ALTA, SSDD; - for standard input.",
+        "ASTM, UTIA, ALTA, SSDD, pab-opto, road r-tables; - for standard input.",
         callback=_source,
     ),
 ]

@@ -29,8 +29,10 @@ import test_astm
 import test_fred
 import test_lighttools
 import test_merl
+import test_pab_opto
 import test_parquet
 import test_rgl
+import test_road
 import test_ssdd
 import test_tensor
 import test_utia
@@ -165,6 +167,8 @@ READERS = {
     "astm": Reader(test_astm.sample, (test_zemax.mutated,)),
     "alta": Reader(test_alta.sample, (test_zemax.mutated,)),
     "ssdd": Reader(test_ssdd.sample, (test_zemax.mutated,), "ssdd/*.ssdd"),
+    "road": Reader(test_road.sample, (test_zemax.mutated,)),
+    "pab_opto": Reader(test_pab_opto.sample, (test_zemax.mutated,)),
     "utia": Reader(_utia, (test_utia.mutated,), prepare=_small_utia),
     "utia_whole": Reader(test_utia.sample, (test_utia.mutated,)),
     "parquet": Reader(test_parquet.sample, (test_parquet.mutated,)),
