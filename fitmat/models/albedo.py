@@ -13,13 +13,23 @@ from fitmat.errors import ModelError
 from fitmat.maths.quadrature import AZIMUTH_NODES, ZENITH_NODES, incidence_rule, lobe_rule
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector
-from fitmat.models.values import Draws, blocks, widths
+from fitmat.models.values import LARGE, Draws, blocks, slices, widths
 from fitmat.text import brief
 
-FINE = (ZENITH_NODES, AZIMUTH_NODES)
+COARSER = 5 / 8
+"""Nodes of two coarser rules, one in zenith and one in azimuth, over those of the rule that gives the value.
 
-COARSE = (ZENITH_NODES * 3 // 4, AZIMUTH_NODES * 3 // 4)
-"""Nodes of the second, coarser rule; the error of a converging rule is well below its distance from a coarser one."""
+The error of a converging rule is well below its distance from a coarser one.
+"""
+
+GOAL = 1e-3
+"""Where the bound is larger (relative above 1), the nodes that cause it are doubled until it is not."""
+
+MOST_NODES = (512, 2048)
+"""In zenith, and in azimuth on one side."""
+
+STREAK = 4.0
+"""Azimuths on one side times the width for anisotropic models: the streak of a brushed surface is that narrow."""
 
 LEAST = 1e-4
 """What the bound never falls below: two rules may agree by chance."""
@@ -34,8 +44,8 @@ class Albedo:
 
     Attributes:
         value: One row per incidence, one column per channel; 1 is all of it.
-        error: Bound of the quadrature's error, same shape: twice the distance of two rules, of which the finer gave
-            `value`, and `LEAST`.
+        error: Bound of the quadrature's error, same shape: twice the distances of two coarser rules from that which
+            gave `value`, and `LEAST`.
     """
 
     value: Float[np.ndarray, "k c"]
@@ -54,7 +64,7 @@ def albedo(model: AbstractBRDF, theta_i: ArrayLike | None = None, phi_i: ArrayLi
         phi_i: Azimuths of incidence in radians, (k,) or one; of no consequence for isotropic models.
 
     Returns:
-        The albedo with its error bound: about 10⁻³ (relative) for lobes down to α = 10⁻³ and θ_i up to 80°.
+        The albedo with its error bound: at most 10⁻³ for isotropic lobes, and for anisotropic ones down to α = 10⁻³.
 
     Raises:
         FitmatError: no model, angles out of range, as in degrees, or of unlike shapes.
@@ -75,8 +85,9 @@ def albedo(model: AbstractBRDF, theta_i: ArrayLike | None = None, phi_i: ArrayLi
         raise ModelError(f"theta_i and phi_i have shapes {theta.shape} and {phi.shape}: expected the same (k,), k ≥ 1.")
     theta, phi = np.broadcast_arrays(theta, phi)
     part = model, vector(model)[None]
-    fine, coarse = (_albedo(part, float(widths(*part)[0]), (theta, phi), nodes) for nodes in (FINE, COARSE))
-    return Albedo(fine, 2.0 * np.abs(fine - coarse) + LEAST)
+    width = float(widths(*part)[0])
+    azimuths = AZIMUTH_NODES if model.isotropic else max(AZIMUTH_NODES, min(int(STREAK / width), MOST_NODES[1]))
+    return _refined(part, width, (theta, phi), (ZENITH_NODES, azimuths))
 
 
 def _from_everywhere(model: AbstractBRDF) -> Albedo:
@@ -88,12 +99,29 @@ def _from_everywhere(model: AbstractBRDF) -> Albedo:
     return Albedo((share @ found.value)[None], (share @ found.error)[None])
 
 
+def _refined(part: Draws, width: float, angles: tuple[np.ndarray, np.ndarray], nodes: tuple[int, int]) -> Albedo:
+    """By that many nodes; incidences that miss `GOAL` again with twice as many where they are too few."""
+    fine = _albedo(part, width, angles, nodes)
+    sparse = [(round(nodes[0] * COARSER), nodes[1]), (nodes[0], round(nodes[1] * COARSER))]
+    apart = np.stack([2.0 * np.abs(fine - _albedo(part, width, angles, few)) for few in sparse])
+    found = Albedo(fine, apart.sum(axis=0) + LEAST)
+    goal = GOAL * np.maximum(1.0, fine)
+    far = (found.error > goal).any(axis=1)
+    few = (apart[:, far] > (goal / 4)[far]).any(axis=(1, 2))
+    more = tuple(min(count * (1 + bool(f)), most) for count, f, most in zip(nodes, few, MOST_NODES, strict=True))
+    if far.any() and more != nodes:
+        again = _refined(part, width, (angles[0][far], angles[1][far]), more)
+        found.value[far], found.error[far] = again.value, again.error
+    return found
+
+
 def _albedo(
     part: Draws, width: float, angles: tuple[np.ndarray, np.ndarray], nodes: tuple[int, int]
 ) -> Float[np.ndarray, "k c"]:
-    turned = not part[0].isotropic
-    rules = [
-        lobe_rule(theta, width, phi_i=phi if turned else None, nodes=nodes) for theta, phi in zip(*angles, strict=True)
-    ]
-    found = blocks([part], [(rule.wi, rule.wo) for rule in rules])
-    return np.stack([rules[k].weight @ f[0] for _, k, (f,) in found])
+    turned, found = not part[0].isotropic, []
+    for some in slices(len(angles[0]), max(1, LARGE[1] // (nodes[0] * nodes[1]))):
+        each = zip(*(angle[some] for angle in angles), strict=True)
+        rules = [lobe_rule(theta, width, phi_i=phi if turned else None, nodes=nodes) for theta, phi in each]
+        reflected = blocks([part], [(rule.wi, rule.wo) for rule in rules])
+        found += [rules[k].weight @ f[0] for _, k, (f,) in reflected]
+    return np.stack(found)

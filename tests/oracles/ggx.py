@@ -10,6 +10,9 @@ from numpy.typing import ArrayLike
 Vectors = np.ndarray
 """(…, 3)."""
 
+Slopes = float | tuple[float, float]
+"""One alpha, or alpha_x and alpha_y."""
+
 
 def fresnel(cos: np.ndarray, eta: float) -> np.ndarray:
     """(R_s + R_p)/2 with Snell's law, eta > 1."""
@@ -19,10 +22,10 @@ def fresnel(cos: np.ndarray, eta: float) -> np.ndarray:
     return (r_s**2 + r_p**2) / 2
 
 
-def smith(v: Vectors, alpha: float) -> np.ndarray:
-    """Λ(v) = (−1 + √(1 + α² tan²θ))/2."""
-    tan2 = (1 - v[..., 2] ** 2) / v[..., 2] ** 2
-    return (np.sqrt(1 + alpha**2 * tan2) - 1) / 2
+def smith(v: Vectors, alpha: Slopes) -> np.ndarray:
+    """Λ(v) = (−1 + √(1 + (α_x² v_x² + α_y² v_y²)/v_z²))/2 (Heitz 2014, eqs. 72 and 80)."""
+    stretched = v[..., :2] * alpha / v[..., 2:]
+    return (np.sqrt(1 + np.sum(stretched**2, axis=-1)) - 1) / 2
 
 
 def brdf(wi: Vectors, wo: Vectors, alpha: float, eta: float) -> np.ndarray:
@@ -35,9 +38,10 @@ def brdf(wi: Vectors, wo: Vectors, alpha: float, eta: float) -> np.ndarray:
     return fresnel(np.sum(wi * h, axis=-1), eta) * d * g2 / (4 * wi[..., 2] * wo[..., 2])
 
 
-def visible_normals(wi: Vectors, alpha: float, u1: np.ndarray, u2: np.ndarray) -> Vectors:
+def visible_normals(wi: Vectors, alpha: Slopes, u1: np.ndarray, u2: np.ndarray) -> Vectors:
     """Heitz's map of the unit square to micro-normals as often as they are seen from wi, (3,) → (m, 3)."""
-    v = wi * np.array([alpha, alpha, 1.0])
+    stretch = np.append(np.broadcast_to(alpha, 2), 1.0)
+    v = wi * stretch
     v = v / np.linalg.norm(v)
     flat = np.hypot(v[0], v[1])
     t1 = np.array([-v[1], v[0], 0.0]) / flat if flat > 0 else np.array([1.0, 0.0, 0.0])
@@ -46,14 +50,14 @@ def visible_normals(wi: Vectors, alpha: float, u1: np.ndarray, u2: np.ndarray) -
     p1 = radius * np.cos(angle)
     p2 = (1 - s) * np.sqrt(1 - p1**2) + s * radius * np.sin(angle)
     n = np.stack([p1, p2, np.sqrt(np.maximum(0, 1 - p1**2 - p2**2))], axis=-1) @ np.stack([t1, t2, v])
-    n = n * np.array([alpha, alpha, 1.0])
+    n = n * stretch
     return n / np.linalg.norm(n, axis=-1, keepdims=True)
 
 
-def albedo(theta: float, alpha: float, eta: float, cells: int = 500) -> float:
+def albedo(theta: float, alpha: Slopes, eta: float, cells: int = 500, phi: float = 0.0) -> float:
     """∫ f c_o dω_o = mean of F G2/G1 over visible normals; the grid u1 = 1 − (1−t)² is dense in the tail of slopes."""
     t, u2 = (part.ravel() for part in np.meshgrid(*[(np.arange(cells) + 0.5) / cells] * 2))
-    wi = np.array([np.sin(theta), 0.0, np.cos(theta)])
+    wi = np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
     h = visible_normals(wi, alpha, 1 - (1 - t) ** 2, u2)
     cos = h @ wi
     wo = 2 * cos[:, None] * h - wi

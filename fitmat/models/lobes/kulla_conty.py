@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import above
-from fitmat.maths.quadrature import Curve, cosine_mean, curve, lobe_rule
+from fitmat.maths.quadrature import Curve, cosine_mean, curve, facets, reflected
 from fitmat.models.base import AbstractSpecular, specular_weight
 from fitmat.models.lobes.microfacet import Microfacet
 from fitmat.models.terms.distributions import GGX, AbstractDistribution, Isotropic, Masking
@@ -71,7 +71,7 @@ class KullaConty(AbstractSpecular):
         white = Microfacet(jnp.ones(()), self.roughness, White(), self.distribution, self.masking)
 
         def at(cos: Scalar) -> Scalar:
-            rule = lobe_rule(jnp.arccos(cos), self.roughness.alpha, nodes=NODES)
+            rule = reflected(facets(jnp.arccos(cos), self.roughness.alpha, nodes=NODES))
             return rule.weight @ jax.vmap(lambda wo: white(rule.wi, wo))(rule.wo)
 
         return curve(at)
