@@ -11,13 +11,13 @@ from fitmat.cli.flags.design import CountFlag, ForFlag, KindFlag
 from fitmat.cli.flags.files import (
     ConvertedFlag,
     DesignPlotFlag,
-    FileFlag,
     ForceFlag,
     JsonFlag,
     OutFlag,
     PlotFlag,
     ReplaceFlag,
     ReplacePlotFlag,
+    files,
 )
 from fitmat.cli.flags.fitting import (
     CheckPosteriorFlag,
@@ -90,13 +90,14 @@ def about(version: VersionFlag = False) -> None:
     "  fitmat fit measurements.csv --models lambert+ggx --fix ks=1 --out run1\n\n"
     "  fitmat fit gold.csv --models ggx --ior Au --fix ks=1\n\n"
     "  fitmat fit scan.txt --columns theta_i=AOI,brdf=4 --no-mcmc\n\n"
+    "  fitmat fit plate_10deg.txt plate_40deg.txt plate_70deg.txt --join\n\n"
     "  fitmat fit mirror.csv --receiver-angle 0.5 --calibration 0.03",
 )
-@takes(reading, instrument)
+@takes(files, reading, instrument)
 def fit(
+    files: list[Path],
     reading: dict[str, Any],
     instrument: Any,
-    file: FileFlag,
     models: ModelsFlag = DEFAULT_MODELS,
     out: OutFlag = None,
     force: ForceFlag = False,
@@ -125,7 +126,7 @@ def fit(
         told = {"models": models, "loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
         told |= fit.known(fix or [], prior or [])
         told |= {"sampling": not no_mcmc, "second_opinion": check_posterior, "full": full}
-        done = fit.write_report(file, out, reading | {"instrument": instrument}, told, watch, force=force)
+        done = fit.write_report(files, out, reading | {"instrument": instrument}, told, watch, force=force)
     done.tell(as_json=json_)
     if not done.converged:
         raise typer.Exit(NOT_CONVERGED)
@@ -173,11 +174,11 @@ def simulate(
     cls=Command,
     epilog="Examples:\n\n  fitmat check measurements.csv --plot coverage.png\n\n  fitmat check gold.binary --json",
 )
-@takes(reading, instrument)
+@takes(files, reading, instrument)
 def check(
+    files: list[Path],
     reading: dict[str, Any],
     instrument: Any,
-    file: FileFlag,
     plot: PlotFlag = None,
     force: ReplacePlotFlag = False,
     json_: JsonFlag = False,
@@ -190,12 +191,13 @@ def check(
     from fitmat.reports.pictures import refuse_picture
 
     refuse_picture(plot, force=force)
-    found = examine(read(file, **reading, instrument=instrument))
+    found = examine(read(files, **reading, instrument=instrument))
     process.say(check.as_json(found) if json_ else str(found))
     if plot is not None:
         check.draw(found, plot)
     elif not json_:
-        process.say(f"See what was measured where: fitmat check {for_shell(file)} --plot coverage.png")
+        given = " ".join([*map(for_shell, files), *(["--join"] if len(files) > 1 else [])])
+        process.say(f"See what was measured where: fitmat check {given} --plot coverage.png")
 
 
 @app.command(
@@ -204,10 +206,10 @@ def check(
     "  fitmat convert gold.binary gold.parquet\n\n"
     "  fitmat convert scan.txt scan.bsdf --columns theta_i=AOI,brdf=4",
 )
-@takes(reading)
+@takes(files, reading)
 def convert(
+    files: list[Path],
     reading: dict[str, Any],
-    file: FileFlag,
     out: ConvertedFlag,
     force: ReplaceFlag = False,
 ) -> None:
@@ -215,7 +217,7 @@ def convert(
     process.refuse_little_memory()
     from fitmat.cli import convert
 
-    process.say("\n".join([*convert.written(file, reading, out, force=force), visible(str(out))]))
+    process.say("\n".join([*convert.written(files, reading, out, force=force), visible(str(out))]))
 
 
 @app.command(cls=Command)
@@ -241,11 +243,11 @@ def models(
     epilog="Examples:\n\n  fitmat design measurements.csv --for eta\n\n"
     "  fitmat design measurements.csv --for match --kind curve --plot next.png",
 )
-@takes(reading, instrument)
+@takes(files, reading, instrument)
 def design(
+    files: list[Path],
     reading: dict[str, Any],
     instrument: Any,
-    file: FileFlag,
     models: ModelsFlag = DEFAULT_MODELS,
     for_: ForFlag = None,
     kind: KindFlag = "sample",
@@ -267,7 +269,7 @@ def design(
         from fitmat.reports.pictures import refuse_picture
 
         refuse_picture(plot, force=force)
-        measurements = read(file, **reading, instrument=instrument)
+        measurements = read(files, **reading, instrument=instrument)
         with programs.announced(watch.compiling):
             posteriors = design.fitted(measurements, models, fix or [], seed, watch)
             watch("looking for the next angles", 0, 0)

@@ -4,7 +4,7 @@ The formats are those of `measurements`.
 """
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +12,11 @@ from fitmat.measurements import writing
 from fitmat.measurements.reader import read
 
 
-def written(file: Path, reading: Mapping[str, Any], out: Path, *, force: bool) -> list[str]:
-    """Write the measurements of a file to another; what they are, and what the other cannot hold, as lines.
+def written(sources: Sequence[Path], reading: Mapping[str, Any], out: Path, *, force: bool) -> list[str]:
+    """Write the measurements of files to another; what they are, and what that cannot hold, as lines.
 
     Args:
-        file: To read.
+        sources: Files to read, as one measurement.
         reading: Arguments of `fitmat.read`.
         out: To write; its ending names the format.
         force: Whether to replace it.
@@ -24,7 +24,7 @@ def written(file: Path, reading: Mapping[str, Any], out: Path, *, force: bool) -
     Raises:
         FitmatError: as `fitmat.read` and `fitmat.write`.
     """
-    measurements = read(file, **reading)
+    measurements = read(sources, **reading)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the losses are among the lines
         writing.write(measurements, out, force=force)

@@ -62,7 +62,7 @@ def known(fixed: Sequence[str], believed: Sequence[str]) -> dict[str, Any]:
 
 
 def write_report(
-    file: Path,
+    sources: Sequence[Path],
     folder: Path | None,
     reading: Mapping[str, Any],
     told: Mapping[str, Any],
@@ -70,11 +70,11 @@ def write_report(
     *,
     force: bool,
 ) -> Report:
-    """Study a file and write the report; Ctrl-C before its end takes away what is half done.
+    """Study files as one measurement and write the report; Ctrl-C before its end takes away what is half done.
 
     Args:
-        file: The measurements.
-        folder: For the report; None for one beside the file.
+        sources: The files of the measurements.
+        folder: For the report; None for one beside the first file, with its name.
         reading: Arguments of `fitmat.read`.
         told: Arguments of `study`.
         watch: Is told what is done.
@@ -83,10 +83,10 @@ def write_report(
     Raises:
         FitmatError: as `fitmat.read`, `study` and `files.new`.
     """
-    target = folder or files.default(file)
+    target = folder or files.default(sources[0])
     draft = interrupts.taken_away(files.new(target, own=page.own, force=force), files.abandon)
     with draft as written, programs.announced(watch.compiling):
-        measurements = session.source(file, reading, watch)
+        measurements = session.source(sources, reading, watch)
         found = study(measurements, resume=files.resumed(target), progress=watch, **told)
         watch("writing the report", 0, 0)
         missing = page.write(written, found)

@@ -6,7 +6,7 @@ Nothing is computed here, and no result is shown.
 import contextlib
 import signal
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TaskID, TextColumn
 
 from fitmat._types import SAMPLING
 from fitmat.cli import process
+from fitmat.errors import ReadError
 from fitmat.text import visible
 
 if TYPE_CHECKING:
@@ -123,18 +124,23 @@ def watch(what: str = "loading") -> Iterator[Watch]:
         sys.stderr.flush()
 
 
-def source(file: Path, reading: Mapping[str, Any], told: Watch) -> "Measurements | Stream":
-    """The measurements of a file: in memory, or to be passed over where it is large.
+def source(files: Sequence[Path], reading: Mapping[str, Any], told: Watch) -> "Measurements | Stream":
+    """The measurements of one file, in memory, or to be passed over where it is large; or of several, in memory.
 
     Raises:
-        ReadError: as `fitmat.read`.
+        ReadError: as `fitmat.read`, or one of several is large.
     """
     from fitmat.measurements.large import chunks
     from fitmat.measurements.parsing.contents import is_stream
     from fitmat.measurements.reader import read
 
-    if is_stream(file) or not chunks.is_large(file):
-        return read(file, **reading)
+    large = [path for path in files if not is_stream(path) and chunks.is_large(path)]
+    if not large:
+        return read(files, **reading)
+    (file, *others) = files
+    if others:
+        got = f"{large[0].name}: more than {chunks.LARGE >> 20} MB, expected less in files that are joined"
+        raise ReadError(f"{got}. Write all rows into one table, which is read block by block.")
 
     def passing(step: str, done: int, total: int) -> None:
         told(f"reading {file.name}: {step}", done, total)

@@ -318,6 +318,42 @@ def test_where_and_panel_reach_the_fit(run: Run, tmp_path: Path, reached: list[M
     assert reached[0].value[:, 0] == pytest.approx(expected, rel=1e-12)  # one division and one product in float64
 
 
+@pytest.fixture
+def halves(sparse: Path) -> list[str]:
+    """The file in two, one incidence in the first, and a comma for the point and a reflectance factor in the second."""
+    head, *rows = [line for line in sparse.read_text().splitlines() if not line.startswith("#")]
+    Path("steep.csv").write_text("\n".join([head, *rows[:17], ""]))
+    flat = [[float(cell) for cell in row.split(",")] for row in rows[17:]]
+    cells = [f"{i};{o};{np.pi * f:.12g};{np.pi * s:.12g}".replace(".", ",") for i, o, f, s in flat]
+    Path("flat.txt").write_text("\n".join(["AOI;VZA;BRF;sigma", *cells, ""]))
+    return ["steep.csv", "flat.txt"]
+
+
+def test_joined_halves_reach_the_fit_as_the_whole(run: Run, halves: list[str], reached: list[Measurements]) -> None:
+    assert_refused(run("fit", *halves, "--join", "--calibration", 0.03), "arrived")
+    assert_refused(run("fit", "sparse.csv", "--calibration", 0.03), "arrived")
+    joined, whole = reached
+    for name in ("wi", "wo", "value", "sigma"):
+        np.testing.assert_allclose(getattr(joined, name), getattr(whole, name), rtol=1e-9, atol=1e-12)
+    assert joined.instrument == whole.instrument
+
+
+def test_check_and_convert_join_too(run: Run, halves: list[str]) -> None:
+    ended = run("check", *halves, "--join")
+    assert (ended.code, ended.err) == (0, "")
+    assert ended.out.startswith("steep.csv + flat.txt: 51 samples, channel value.\n")
+    assert ended.out.endswith("fitmat check steep.csv flat.txt --join --plot coverage.png\n")
+    assert run("convert", *halves, "all.csv", "--join").code == 0
+    written, whole = numbers("all.csv"), numbers("sparse.csv")
+    assert written["brdf"] == pytest.approx(whole["brdf"], rel=SEVEN_DIGITS)
+
+
+def test_large_files_are_not_joined(run: Run, halves: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are read in parts, of one file; several would have to be in memory at once."""
+    monkeypatch.setattr("fitmat.measurements.large.chunks.LARGE", 500)
+    assert_refused(run("fit", *halves, "--join"), r"steep\.csv: more than 0 MB, expected less in files that are joined")
+
+
 def test_calibration_and_dark_signal_are_fitted_and_reported(run: Run, tmp_path: Path) -> None:
     r"""A Lambertian surface: f = g (kd/π + b/cosθ_o). kd is known no better than g, and b grows like 1/cosθ_o."""
     kd, dark, path = 0.5, 0.01, tmp_path / "felt.csv"

@@ -29,6 +29,14 @@ IDLE: dict[str, tuple[tuple[str, ...], str]] = {
         ("simulate", "lambert", "--catalogue", "x", "--noise", "0.1"),
         "MODEL, --noise would change nothing beside --catalogue",
     ),
+    "nothing to join": (("check", FILE, "--join"), "--join would change nothing for one file"),
+    "files that nobody joins": (
+        ("fit", "a.csv", "b.csv"),
+        "2 files are given (a.csv, b.csv), expected one. If they are one measurement of one sample, as one for each "
+        "incidence, add --join; else give them one by one.",
+    ),
+    "many files": (("check", *(f"{k}.csv" for k in range(9))), "9 files are given (0.csv, 1.csv, 2.csv, 3.csv, …)"),
+    "a file too many": (("convert", "a.csv", "b.csv", "c.csv"), "2 files are given (a.csv, b.csv), expected one"),
     "models twice": (("fit", FILE, "--models", "ggx", "--models", "phong"), "--models is given 2 times, expected one"),
     "columns twice": (("check", FILE, "--columns", "a=1", "--columns", "b=2"), "--columns is given 2 times"),
     "seed twice": (("simulate", "ggx", "--seed", "1", "--seed", "1", "--seed", "2"), "--seed is given 3 times"),

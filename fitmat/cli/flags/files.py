@@ -8,19 +8,30 @@ from typing import Annotated
 
 import typer
 
+from fitmat.cli.flags.reading import FILE
+
 STDIN = Path("/dev/stdin")
 
 
-def _source(file: Path) -> Path:
-    return STDIN if str(file) == "-" else file
+def _sources(given: list[Path]) -> list[Path]:
+    return [STDIN if str(path) == "-" else path for path in given]
 
 
-FileFlag = Annotated[
-    Path,
+FilesFlag = Annotated[
+    list[Path],
     typer.Argument(
         help="Measurements: CSV or any text table (also .gz), Parquet, Excel, MERL, RGL, Zemax, LightTools, FRED, "
-        "ASTM, UTIA, ALTA, SSDD, pab-opto, road r-tables; - for standard input.",
-        callback=_source,
+        "ASTM, UTIA, ALTA, SSDD, pab-opto, road r-tables; - for standard input. Several with --join.",
+        callback=_sources,
+    ),
+]
+
+JoinFlag = Annotated[
+    bool,
+    typer.Option(
+        "--join",
+        help="The files are one measurement of one sample, as one for each incidence: each is read by its own header.",
+        rich_help_panel=FILE,
     ),
 ]
 
@@ -57,3 +68,8 @@ ConvertedFlag = Annotated[
 ReplaceFlag = Annotated[bool, typer.Option("--force", help="Replace what is written where it exists.")]
 
 ReplacePlotFlag = Annotated[bool, typer.Option("--force", help="Replace the picture of --plot where it exists.")]
+
+
+def files(file: FilesFlag, join: JoinFlag = False) -> list[Path]:
+    """The files of one measurement, of which several are given only with `--join`."""
+    return file

@@ -11,6 +11,9 @@ from typer.core import TyperCommand
 NEEDS = {"fit": {"force": "out"}, "check": {"force": "plot"}, "design": {"force": "plot"}}
 """Command → parameter → the one without which it would do nothing."""
 
+MOST = 4
+"""Files that a message names."""
+
 ALONE = {"simulate": {"catalogue": ("force",)}}
 """Command → parameter → what may stand beside it; whatever else is given would do nothing."""
 
@@ -26,6 +29,7 @@ class Command(TyperCommand):
         left = TyperCommand.parse_args(self, ctx, args)
         flags = {p.name: p.opts[0] if p.param_type_name == "option" else p.opts[0].upper() for p in self.params}
         given = [name for name in flags if ctx.get_parameter_source(name).name == "COMMANDLINE"]
+        _refuse_unjoined(ctx)
         for name, other in NEEDS.get(self.name or "", {}).items():
             if name in given and other not in given:
                 ctx.fail(f"{flags[name]} would replace nothing without {flags[other]}. Give both, or neither.")
@@ -34,6 +38,19 @@ class Command(TyperCommand):
             if name in given and others:
                 ctx.fail(f"{', '.join(others)} would change nothing beside {flags[name]}. Leave one or the other out.")
         return left
+
+
+def _refuse_unjoined(ctx: Any) -> None:
+    """Stop at several files that nobody calls one measurement, and at one that is joined to nothing."""
+    files, join = ctx.params.get("file") or [], ctx.params.get("join", False)
+    if len(files) > 1 and not join:
+        named = ", ".join(path.name for path in files[:MOST]) + (", …" if len(files) > MOST else "")
+        ctx.fail(
+            f"{len(files)} files are given ({named}), expected one. If they are one measurement of one sample, as one "
+            "for each incidence, add --join; else give them one by one."
+        )
+    if len(files) == 1 and join:
+        ctx.fail("--join would change nothing for one file. Give the others too, or leave it out.")
 
 
 def _refuse_repeated(ctx: Any, order: list[Any]) -> None:
