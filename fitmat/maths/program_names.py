@@ -18,7 +18,7 @@ import jax
 import numpy as np
 
 PACKAGE = Path(__file__).parents[1]
-"""Whose sources decide what a program computes."""
+"""Whose sources and tables decide what a program computes."""
 
 ARRAYS = (jax.Array, np.ndarray, np.generic)
 """What a program takes as it comes; everything else decides which program it is."""
@@ -62,7 +62,7 @@ def _named(x: type | types.FunctionType) -> str:
 def surroundings() -> str:
     """What decides a program beside its arguments: sources, versions, machine, and the settings of JAX."""
     sources = hashlib.sha256()
-    for path in sorted(PACKAGE.rglob("*.py")):
+    for path in sorted([*PACKAGE.rglob("*.py"), *PACKAGE.rglob("*.npz")]):
         sources.update(str(path.relative_to(PACKAGE)).encode() + b"\0" + path.read_bytes())
     versions = [f"{name} {version(name)}" for name in ("jax", "jaxlib", "equinox", "optimistix", "lineax")]
     settings = f"{jax.default_backend()} {jax.config.read('jax_enable_x64')} {os.environ.get('XLA_FLAGS', '')}"

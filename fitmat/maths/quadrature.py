@@ -181,12 +181,16 @@ class Curve(eqx.Module):
     coefficients: Float[Array, " k"]
 
     def __call__(self, cos: Scalar) -> Scalar:
-        """The function at a cosine in [0, 1], by Clenshaw's recurrence."""
-        x = 2.0 * jnp.sqrt(jnp.maximum(cos, _ROOT_FLOOR)) - 1.0
-        one, two = jnp.zeros_like(x), jnp.zeros_like(x)
-        for k in range(CURVE_NODES - 1, 0, -1):
-            one, two = self.coefficients[k] + 2.0 * x * one - two, one
-        return self.coefficients[0] + x * one - two
+        """The function at a cosine in [0, 1]."""
+        return chebyshev(self.coefficients, 2.0 * jnp.sqrt(jnp.maximum(cos, _ROOT_FLOOR)) - 1.0)
+
+
+def chebyshev(coefficients: Float[Array, " k *n"], x: Float[Array, " *n"]) -> Float[Array, " *n"]:
+    """Σ a_k T_k(x) by Clenshaw's recurrence; where the a_k are arrays, of each of their elements at one x."""
+    one = two = 0.0 * x * coefficients[0]
+    for k in range(len(coefficients) - 1, 0, -1):
+        one, two = coefficients[k] + 2.0 * x * one - two, one
+    return coefficients[0] + x * one - two
 
 
 def curve(function: Callable[[Scalar], Scalar]) -> Curve:
