@@ -9,7 +9,7 @@ Run: python benchmarks/energies.py
 """
 
 import itertools
-from typing import get_args
+from typing import Any, get_args
 
 import jax
 import jax.numpy as jnp
@@ -35,7 +35,7 @@ _values = jax.jit(evaluate_pairs)
 def lost(distribution: AbstractDistribution, masking: Masking, cos: float, alpha: float) -> float:
     """1 − E, by quadrature."""
     rule = lobe_rule(np.arccos(cos), alpha, nodes=NODES[masking])
-    white = Microfacet(jnp.ones(()), Isotropic(alpha), White(), distribution, masking)
+    white = Microfacet(jnp.ones(()), Isotropic(jnp.array(alpha)), White(), distribution, masking)
     return 1.0 - float(rule.weight @ _values(white, np.broadcast_to(rule.wi, rule.wo.shape), rule.wo)[:, 0])
 
 
@@ -60,7 +60,8 @@ def main() -> None:
     """Writes the file and prints errors."""
     jax.config.update("jax_enable_x64", True)
     made = {(d, m): fitted(d, m) for d, m in itertools.product((GGX(), Beckmann()), get_args(Masking))}
-    np.savez(FILE, **{f"{d.label}-{m}": table for (d, m), table in made.items()})
+    tables: dict[str, Any] = {f"{d.label}-{m}": table for (d, m), table in made.items()}
+    np.savez(FILE, **tables)
     rng = np.random.default_rng(0)
     alphas = LEAST_ALPHA ** rng.uniform(size=TRIED)
     cosines = np.minimum(alphas * np.sinh(rng.uniform(size=TRIED) * np.arcsinh(1 / alphas)), 1.0)

@@ -3,8 +3,9 @@
 Both sides estimate the same BRDF values with the same number of paths; the script checks first that they agree within
 Monte Carlo error. Efficiency is 1/(variance × seconds); programs are compiled and warm, rivals run in turn.
 
-It then draws the answers to "where does the energy of a rough surface go?", for white and gold, alpha 0.5 and 1:
-single scattering, Kulla & Conty's compensation, Heitz's walk, and Bitterli & d'Eon's position-free integral.
+It prints how much of what the walk gives back Kulla & Conty and Turquin do, and draws the answers to
+"where does the energy of a rough surface go?", for white and gold, alpha 0.5 and 1: single scattering, Kulla & Conty's
+compensation, Heitz's walk, and Bitterli & d'Eon's position-free integral.
 
 Run: python benchmarks/multiple_scattering.py [--samples 200000] [--repeats 7] [--figure FILE.png]
 """
@@ -29,8 +30,9 @@ from fitmat.models.lobes.microfacet import Microfacet
 from fitmat.models.multiple_scattering.position_free import evaluate_slab
 from fitmat.models.multiple_scattering.random_walk import albedo_walk, evaluate_walk
 from fitmat.models.multiple_scattering.surface import Surface
+from fitmat.models.registry import model
 from fitmat.models.terms.distributions import GGX, Isotropic
-from fitmat.models.terms.fresnel import AbstractFresnel, Conductor, White
+from fitmat.models.terms.fresnel import AbstractFresnel, Conductor, Schlick, White
 
 PAIRS = ((10, 30, 180), (45, 45, 180), (60, 20, 90), (75, 75, 180), (75, 60, 40))
 """theta_i, theta_o, phi in degrees."""
@@ -81,6 +83,23 @@ def lobes(fresnel: AbstractFresnel, alpha: float) -> dict[str, AbstractBRDF]:
     return {"single": Microfacet(one, rough, fresnel), "Kulla–Conty": KullaConty(one, rough, fresnel)}
 
 
+def compensated(samples: int) -> list[list[str]]:
+    """What a viewer sees of light from everywhere, F0 = 0.6 (Schlick): closed forms beside the walk."""
+    rows, degrees = [], (0.0, 30.0, 60.0, 80.0)
+    wi = from_angles(np.deg2rad(degrees), np.zeros(len(degrees)))
+    for alpha in (0.1, 0.3, 0.6, 1.0):
+        rough = Surface(GGX(), (alpha, alpha), Schlick(jnp.array(0.6)))
+        walked = albedo_walk(rough, wi, samples=samples, seed=1).reflected
+        made = [model(f"ggx{part}-schlick", alpha=alpha, f0=0.6) for part in ("", "-kc", "-turquin")]
+        for k, angle in enumerate(degrees):
+            rule = lobe_rule(np.deg2rad(angle), alpha)
+            viewer = np.broadcast_to(rule.wi, rule.wo.shape)
+            seen = [f"{float(rule.weight @ evaluate(one, rule.wo, viewer)[:, 0]):.3f}" for one in made]
+            walk = f"{walked.value[k, 0]:.3f} ± {walked.standard_error[k, 0]:.4f}"
+            rows.append([f"{alpha:g}", f"{angle:g}°", *seen, walk])
+    return rows
+
+
 def draw_albedo(ax: Axes, name: str, alpha: float, samples: int) -> None:
     """Directional albedo against the angle of incidence."""
     fine = np.deg2rad(np.linspace(0, 88, 45))
@@ -99,7 +118,7 @@ def draw_albedo(ax: Axes, name: str, alpha: float, samples: int) -> None:
 
 def position_free_albedo(rough: Surface, degrees: float, alpha: float) -> tuple[float, float]:
     """∫ f c_o dω_o over values of the position-free estimator, with its standard error."""
-    rule = lobe_rule(jnp.array(np.deg2rad(degrees)), jnp.array(alpha), nodes=(48, 24))
+    rule = lobe_rule(np.deg2rad(degrees), alpha, nodes=(48, 24))
     weight = np.asarray(rule.weight)
     wo = np.where(np.asarray(rule.wo)[:, 2:] > 0, rule.wo, [0.0, 0.0, 1.0])
     found = evaluate_slab(rough, np.tile(np.asarray(rule.wi), (len(wo), 1)), wo, samples=64, seed=4)
@@ -108,17 +127,17 @@ def position_free_albedo(rough: Surface, degrees: float, alpha: float) -> tuple[
 
 def draw_slice(ax: Axes, name: str, alpha: float, samples: int) -> None:
     """BRDF in the plane of incidence for light from 45°."""
-    for label, signed in (("lines", np.linspace(-88, 88, 177)), ("points", np.linspace(-80, 80, 17))):
+    for drawn, signed in (("lines", np.linspace(-88, 88, 177)), ("points", np.linspace(-80, 80, 17))):
         theta, phi = np.deg2rad(np.abs(signed)), np.where(signed > 0, np.pi, 0.0)
         wo, wi = from_angles(theta, phi), np.tile(from_angles(np.deg2rad([45.0]), np.zeros(1)), (len(signed), 1))
-        if label == "lines":
-            for model, lobe in lobes(METALS[name], alpha).items():
-                ax.plot(signed, evaluate(lobe, wi, wo)[:, 0], color=COLOURS[model])
+        if drawn == "lines":
+            for label, lobe in lobes(METALS[name], alpha).items():
+                ax.plot(signed, evaluate(lobe, wi, wo)[:, 0], color=COLOURS[label])
             continue
-        for model, f, marker in (("walk", evaluate_walk, "o"), ("position-free", evaluate_slab, "x")):
+        for label, f, marker in (("walk", evaluate_walk, "o"), ("position-free", evaluate_slab, "x")):
             found = f(surface(METALS[name], alpha), wi, wo, samples=samples, seed=5)
             ax.errorbar(
-                signed, found.value[:, 0], 2 * found.standard_error[:, 0], fmt=marker, ms=4, color=COLOURS[model]
+                signed, found.value[:, 0], 2 * found.standard_error[:, 0], fmt=marker, ms=4, color=COLOURS[label]
             )
     ax.set(title=f"{name}, α = {alpha:g}, θ_i = 45°", xlabel="θ_o / ° (mirror side positive)", ylabel="f / sr⁻¹")
 
@@ -150,6 +169,8 @@ def main() -> None:
     headings = ["θ_i/θ_o/φ", "walk", "position-free", "variance, times less", "time, times more", "gain"]
     rows = [row for name in METALS for row in efficiency(name, chosen.samples, chosen.repeats)]
     machine.show(f"GGX, alpha 0.5, {chosen.samples} paths per pair", headings, rows)
+    headings = ["alpha", "angle of view", "single", "-kc", "-turquin", "walk"]
+    machine.show("Light that a viewer sees, F0 = 0.6", headings, compensated(chosen.samples))
     figure(chosen.samples // 10).savefig(chosen.figure, dpi=110)
 
 

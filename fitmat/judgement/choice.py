@@ -179,7 +179,8 @@ def every_model(measurements: Measurements | None = None) -> tuple[str, ...]:
 
     Diffuse lobes and those with a diffuse part of their own stand alone, the others on a Lambert base; the Fresnel
     term is each lobe's default, beside `OTHER_FRESNELS`. Anisotropic lobes are tried only where the sample was turned
-    or seen out of the plane: else their second width is not determined.
+    or seen out of the plane: else their second width is not determined. Of the two forms of compensation `-kc` is
+    tried: `-turquin` stands for the same surface.
 
     Args:
         measurements: What will be fitted; None for all.
@@ -189,8 +190,9 @@ def every_model(measurements: Measurements | None = None) -> tuple[str, ...]:
     turned = m is None or not bool(m.in_plane.all()) or bool(np.ptp(m.phi_i) > 0)
     names = []
     for name, lobe in LOBES.items():
-        anisotropic = "aniso" in name.split("-")
-        if lobe.kind == "cover" or lobe.fresnel_suffix(name) or (anisotropic and not turned):
+        parts = name.split("-")
+        again = "turquin" in parts or ("aniso" in parts and not turned)
+        if lobe.kind == "cover" or lobe.fresnel_suffix(name) or again:
             continue
         names.append(name if lobe.kind == "diffuse" or name in WHOLE else f"lambert+{name}")
     return (*names, *OTHER_FRESNELS, "rough-varnish-over-lambert")

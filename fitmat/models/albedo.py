@@ -107,8 +107,8 @@ def _refined(part: Draws, width: float, angles: tuple[np.ndarray, np.ndarray], n
     found = Albedo(fine, apart.sum(axis=0) + LEAST)
     goal = GOAL * np.maximum(1.0, fine)
     far = (found.error > goal).any(axis=1)
-    few = (apart[:, far] > (goal / 4)[far]).any(axis=(1, 2))
-    more = tuple(min(count * (1 + bool(f)), most) for count, f, most in zip(nodes, few, MOST_NODES, strict=True))
+    few = np.any(apart[:, far] > (goal / 4)[far], axis=(1, 2))
+    more = min(nodes[0] * (1 + few[0]), MOST_NODES[0]), min(nodes[1] * (1 + few[1]), MOST_NODES[1])
     if far.any() and more != nodes:
         again = _refined(part, width, (angles[0][far], angles[1][far]), more)
         found.value[far], found.error[far] = again.value, again.error

@@ -29,6 +29,7 @@ from fitmat.models.lobes.lambert import Lambert
 from fitmat.models.lobes.microfacet import Microfacet
 from fitmat.models.lobes.oren_nayar import EnergyPreservingOrenNayar, OrenNayar, OrenNayarFull
 from fitmat.models.lobes.phong import BlinnPhong, BlinnPhongExact, Phong
+from fitmat.models.lobes.turquin import Turquin
 from fitmat.models.lobes.walter import Walter
 from fitmat.models.lobes.ward import Ward, WardBounded
 from fitmat.models.parameters import Param, as_parameter, check_range
@@ -105,12 +106,12 @@ def _microfacet() -> dict[str, Lobe]:
     }
 
 
-def _kulla_conty() -> dict[str, Lobe]:
+def _compensated(shape: type[KullaConty | Turquin], suffix: str, *distributions: Any) -> dict[str, Lobe]:
     return {
-        normals.label + "-kc" + fresnel.suffix: Lobe(
-            KullaConty, "microfacet", {"roughness": Isotropic, "fresnel": fresnel, "distribution": normals}
+        normals.label + suffix + fresnel.suffix: Lobe(
+            shape, "microfacet", {"roughness": Isotropic, "fresnel": fresnel, "distribution": normals}
         )
-        for normals in (GGX, Beckmann)
+        for normals in distributions
         for fresnel in FRESNELS
     }
 
@@ -143,7 +144,8 @@ LOBES: dict[str, Lobe] = {
     "walter-ggx": _walter(GGX),
     "walter-beckmann": _walter(BeckmannRational),
     **_microfacet(),
-    **_kulla_conty(),
+    **_compensated(KullaConty, "-kc", GGX, Beckmann),
+    **_compensated(Turquin, "-turquin", GGX),
     "plastic": Lobe(Plastic, "microfacet"),
     "disney-2012": Lobe(Disney2012, "microfacet", _DISNEY),
     "disney-2015": Lobe(Disney2015, "microfacet", _DISNEY),

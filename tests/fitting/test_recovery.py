@@ -66,6 +66,7 @@ CASES: dict[str, Case] = {
     **_microfacet("beckmann-aniso", BRUSHED, ""),
     **_microfacet("ggx-kc", {"alpha": 0.5}, "", "-conductor"),
     **_microfacet("beckmann-kc", {"alpha": 0.5}, ""),
+    **_microfacet("ggx-turquin", {"alpha": 0.5}, "", "-conductor"),
     "plastic": ({"alpha": 0.2, "eta": 1.5, "kd": 0.4}, BARE),
     "disney-2012": (
         {"base_color": 0.4, "subsurface": 0.0, "specular": 0.6, "roughness": 0.5, "sheen": 0.5, "clearcoat": 0.4}
@@ -117,9 +118,8 @@ def deviation(found: Fit, name: str, values: dict[str, Any]) -> float:
 
 def test_no_lobe_is_left_out() -> None:
     """But for combinations of roughness or compensation with a Fresnel term other than the first."""
-    combined = [
-        name for name, lobe in LOBES.items() if lobe.fresnel_suffix(name) and ("-aniso" in name or "-kc" in name)
-    ]
+    parts = ("-aniso", "-kc", "-turquin")
+    combined = [n for n, lobe in LOBES.items() if lobe.fresnel_suffix(n) and any(part in n for part in parts)]
     assert set(LOBES) - set(CASES) <= set(combined)
 
 

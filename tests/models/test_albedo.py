@@ -118,7 +118,7 @@ def test_the_stated_error_bounds_that_of_every_lobe(name: str) -> None:
 def test_the_stated_error_bounds_that_of_a_brushed_surface(phi: float) -> None:
     """Against visible normals; a streak of 0.01 by 1 near grazing."""
     theta, turn = np.deg2rad(85.0), np.deg2rad(phi)
-    found = albedo(fm.model("ggx-aniso", alpha_x=0.01, alpha_y=1.0, eta=1.5), [theta], turn)
+    found = albedo(fm.model("ggx-aniso", alpha_x=0.01, alpha_y=1.0, eta=1.5), np.array([theta]), turn)
     expected = ggx.albedo(theta, (0.01, 1.0), 1.5, 700, turn)
     assert abs(found.value[0, 0] - expected) < found.error[0, 0] <= 1e-3
 
@@ -169,7 +169,7 @@ def test_a_mirror_reflects_fresnels_share() -> None:
 def test_the_rule_integrates_cosines(power: int) -> None:
     """∫ c_oᵏ c_o dω_o = 2π/(k+2), for any width of the rule."""
     for width in (0.01, 0.3, 1.0):
-        rule = lobe_rule(jnp.array(0.6), jnp.array(width))
+        rule = lobe_rule(0.6, width)
         assert rule.weight @ rule.wo[:, 2] ** power == pytest.approx(2 * np.pi / (power + 2), rel=WIDE)
         np.testing.assert_allclose(jnp.linalg.norm(rule.wo, axis=1), 1.0)
 

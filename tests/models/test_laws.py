@@ -28,7 +28,11 @@ ALL = [*(laws.example(name) for name in LOBES), *SUMS]
 PLAIN = [name for name, lobe in LOBES.items() if not lobe.fresnel_suffix(name)]
 """One lobe for each class, roughness and distribution: with the exact dielectric, or without a Fresnel term."""
 
-TRIED = [n for n, lobe in LOBES.items() if not (lobe.fresnel_suffix(n) and ("-aniso" in n or "-kc" in n))]
+TRIED = [
+    n
+    for n, lobe in LOBES.items()
+    if not (lobe.fresnel_suffix(n) and any(part in n for part in ("-aniso", "-kc", "-turquin")))
+]
 """Fresnel terms are the same code in every lobe: tried with isotropic roughness and without compensation only. All
 combinations are measured by `fitmat models --check`."""
 

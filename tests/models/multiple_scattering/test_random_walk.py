@@ -185,7 +185,7 @@ def test_white_furnace(distribution: AbstractDistribution) -> None:
     Of the estimator with the smaller standard errors; that the walk has the same mean is tested below.
     """
     for alpha, theta in [(0.1, 0.0), (0.1, 85.0), (0.5, 50.0), (1.0, 85.0)]:
-        rule = lobe_rule(jnp.array(np.deg2rad(theta)), jnp.array(alpha), nodes=(48, 24))
+        rule = lobe_rule(np.deg2rad(theta), alpha, nodes=(48, 24))
         weight = np.asarray(rule.weight)
         wo = np.where(np.asarray(rule.wo)[:, 2:] > 0, rule.wo, [0.0, 0.0, 1.0])
         wi = np.tile(np.asarray(rule.wi), (len(wo), 1))

@@ -1,5 +1,7 @@
 """Energy that white facets lose: against Blender's tables, averages over normals and closed forms; its slope."""
 
+from typing import cast
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -7,7 +9,7 @@ import pytest
 from oracles import white_facets
 from selection import always
 
-from fitmat.models.terms.distributions import GGX, MASKINGS, AbstractDistribution, Beckmann
+from fitmat.models.terms.distributions import GGX, MASKINGS, AbstractDistribution, Beckmann, Masking
 from fitmat.models.terms.energy import ERROR, missing
 
 DISTRIBUTIONS: dict[str, AbstractDistribution] = {"ggx": GGX(), "beckmann": Beckmann()}
@@ -33,7 +35,7 @@ def test_albedos_are_those_of_cycles(column: int) -> None:
 
 
 @pytest.mark.parametrize("masking", ["correlated", "separable"])
-def test_albedo_at_alpha_1_and_normal_incidence_is_closed(masking: str) -> None:
+def test_albedo_at_alpha_1_and_normal_incidence_is_closed(masking: Masking) -> None:
     """D = 1/π, G1(o) = (2c²−1)/c² for θ_o = 2θ_h: 2∫ (2c²−1)/c dc from 1/√2 to 1 is 1 − ln 2."""
     assert 1 - missing(GGX(), masking, jnp.ones(()))(jnp.ones(())) == pytest.approx(1 - np.log(2), abs=ERROR)
     assert white_facets.albedo("ggx", 1.0, 1 - 1e-12, masking) == pytest.approx(1 - np.log(2), abs=GRID)
@@ -41,7 +43,7 @@ def test_albedo_at_alpha_1_and_normal_incidence_is_closed(masking: str) -> None:
 
 @pytest.mark.parametrize("name", always({"ggx correlated", "beckmann v-cavity"}, ALL))
 def test_the_error_is_as_small_as_stated(name: str) -> None:
-    distribution, masking = name.split()
+    distribution, masking = cast(tuple[str, Masking], name.split())
     cosines = np.array([0.02, 0.05, 0.2, 0.5, 0.9])
     for alpha in (0.002, 0.01, 0.05, 0.2, 0.7, 1.0):
         found = 1 - missing(DISTRIBUTIONS[distribution], masking, jnp.array(alpha))(jnp.array(cosines))
