@@ -43,8 +43,11 @@ def main() -> None:
         process.misused(error)
     except FitmatError as error:
         process.end(str(error))
-    except MemoryError:
-        process.end("there is not enough memory; take fewer models or rows at once, or a machine with more.")
+    except (MemoryError, RuntimeError) as error:
+        words = process.exhausted(error)
+        if not words:
+            raise
+        process.end(words)
     except BrokenPipeError:
         process.silence(1)
         sys.exit(process.NOBODY_READS)

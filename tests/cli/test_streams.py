@@ -3,6 +3,8 @@
 import os
 import subprocess
 import sys
+import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -132,13 +134,50 @@ def test_little_memory_is_said_before_anything_is_loaded(command: str, tmp_path:
     )
 
 
-def test_memory_that_ends_is_said(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def nothing_left(*_: object) -> None:
-        raise MemoryError
+def _too_long() -> None:
+    bytearray(1 << 60)
 
-    monkeypatch.setattr("fitmat.cli.manual.list_losses", nothing_left)
+
+def _too_large_for_xla() -> None:
+    import jax.numpy as jnp
+
+    jnp.zeros(1 << 50).block_until_ready()
+
+
+def _no_room_for_a_stack() -> None:
+    before = threading.stack_size(1 << 45)
+    try:
+        threading.Thread(target=print).start()
+    finally:
+        threading.stack_size(before)
+
+
+MEMORY = "there is not enough memory; take fewer models or rows at once, or a machine with more."
+ENDED = {
+    "memory": (_too_long, MEMORY),
+    "memory of XLA": (_too_large_for_xla, MEMORY),
+    "threads": (
+        _no_room_for_a_stack,
+        "the machine grants no more threads to this user, expected some tens. End other programs, or raise the limit "
+        "of processes (ulimit -u).",
+    ),
+}
+"""What truly ends, and what is said of it."""
+
+
+@pytest.mark.parametrize(("ends", "sentence"), ENDED.values(), ids=ENDED)
+def test_a_machine_that_has_no_more_is_said(
+    run: Run, monkeypatch: pytest.MonkeyPatch, ends: Callable[[], None], sentence: str
+) -> None:
+    monkeypatch.setattr("fitmat.cli.manual.list_losses", ends)
     ended = run("losses")
-    assert (ended.code, ended.out) == (1, "")
-    assert ended.err == (
-        "fitmat: there is not enough memory; take fewer models or rows at once, or a machine with more.\n"
-    )
+    assert (ended.code, ended.out, ended.err) == (1, "", f"fitmat: {sentence}\n")
+
+
+def test_another_error_is_not_called_so(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def wrong() -> None:
+        raise RuntimeError("something else")
+
+    monkeypatch.setattr("fitmat.cli.manual.list_losses", wrong)
+    with pytest.raises(RuntimeError, match="something else"):
+        run("losses")
