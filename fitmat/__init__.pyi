@@ -16,6 +16,9 @@ from .models.albedo import albedo as albedo
 from .models.multiple_scattering.surface import Surface as Surface
 from .models.multiple_scattering.random_walk import evaluate_walk as evaluate_walk
 from .models.multiple_scattering.random_walk import albedo_walk as albedo_walk
+from .models.interface import transmittance as transmittance
+from .models.interface import evaluate_interface as evaluate_interface
+from .models.interface import albedo_interface as albedo_interface
 from .models.multiple_scattering.position_free import evaluate_slab as evaluate_slab
 
 # Fitting

@@ -51,7 +51,7 @@ def test_what_is_masked_or_missing_is_masked() -> None:
 
 MEASURED = fm.from_arrays(0.5, [0.1, 0.2, 0.3], [1.0, 1.0, 1.0])
 LAMBERT = fm.model("lambert")
-SURFACE = fm.Surface(GGX(), (0.5, 0.5), White())
+SURFACE, GLASS = fm.Surface(GGX(), (0.5, 0.5), White()), fm.Surface("ggx", 0.5, 1.5, transmits=True)
 FIT, POSTERIOR, STUDY = (object.__new__(one) for one in (fm.Fit, fm.Posterior, fm.Study))
 """Of the right class and without content: nothing of it is read before the other arguments are looked at."""
 
@@ -161,9 +161,9 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
     "Surface": (
         {"distribution": GGX(), "slopes": (0.5, 0.5), "fresnel": White()},
         {
-            "distribution": (None, "ggx", GGX, 5),
-            "slopes": (None, 0.5, "a", (0.5,), ("a", "b"), (0.5, np.nan), (1j, 1j), (0.5, 45.0)),
-            "fresnel": (None, "schlick", White, 1.5),
+            "distribution": (None, "phong", GGX, 5),
+            "slopes": (None, 45.0, np.nan, "a", (0.5,), ("a", "b"), (0.5, np.nan), (1j, 1j), (0.5, 45.0)),
+            "fresnel": (None, "schlick", White, 0.0, np.nan, True),
             "transmits": FLAG,
         },
     ),
@@ -175,11 +175,33 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
                 "wi": (*NUMBERS, 0.5, [0.5], [[1.0, 1.0, 1.0]]),
                 "samples": (0, 1, *WHOLE),
                 "seed": WHOLE,
-                **({} if name == "albedo_walk" else {"wo": (*NUMBERS, 0.5), "order": without((0, *WHOLE), NOTHING)}),
+                **({} if name == "albedo_walk" else {"wo": (*NUMBERS, 0.5)}),
+                "order": without((0, *WHOLE), NOTHING),
             },
         )
         for name in ("evaluate_walk", "albedo_walk", "evaluate_slab")
     },
+    "transmittance": (
+        {"theta_i": 0.5, "eta": 1.5},
+        {"theta_i": (*NUMBERS, np.nan, 45.0), "eta": (*NUMBERS, np.nan, 0.0, -1.5)},
+    ),
+    "evaluate_interface": (
+        {"surface": GLASS, "wi": UP, "wo": UP},
+        {
+            "surface": (*NOUN, SURFACE),
+            **dict.fromkeys(("wi", "wo"), (*NUMBERS, 0.5, [0.5], [[1.0, 1.0, 1.0]])),
+            "masking": (None, *TEXT, "v-cavity"),
+        },
+    ),
+    "albedo_interface": (
+        {"surface": GLASS, "theta_i": 0.5},
+        {
+            "surface": (*NOUN, SURFACE),
+            "theta_i": (*NUMBERS, np.nan, [], np.zeros((2, 2))),
+            "inside": FLAG,
+            "masking": (None, *TEXT, "v-cavity"),
+        },
+    ),
     "fit": (
         {"measurements": MEASURED, "to": "lambert"},
         {

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
+import numpy as np
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
@@ -20,8 +21,11 @@ from fitmat.maths import programs
 from fitmat.models import laws
 from fitmat.models.registry import LOBES, lobe_names, model
 
-FRESNEL = "fresnel"
-"""The page that compares the Fresnel terms."""
+FRESNEL, TRANSMISSION = "fresnel", "transmission"
+"""Pages of no lobe: the Fresnel terms compared, and what a dielectric interface lets through."""
+
+GLASS = 1.5
+"""Index of the interfaces on that page."""
 
 
 def list_models() -> None:
@@ -34,7 +38,8 @@ def list_models() -> None:
     out.print(
         "\nA model is a sum of lobes, lambert+ggx or lambert+ggx-schlick, alone or below a cover: "
         "varnish-over-lambert+ggx.\n'fitmat models ggx' prints the manual page of a lobe, 'fitmat models fresnel' how "
-        "exact the Fresnel terms are, 'fitmat models --check' which laws the lobes keep.",
+        "exact the Fresnel terms are, 'fitmat models transmission' what a dielectric interface lets through, "
+        "'fitmat models --check' which laws the lobes keep.",
         highlight=False,
     )
 
@@ -83,15 +88,14 @@ def page(name: str) -> None:
     Raises:
         ModelError: no such lobe.
     """
-    if name == FRESNEL:
-        fresnel_terms()
+    if name in (FRESNEL, TRANSMISSION):
+        {FRESNEL: fresnel_terms, TRANSMISSION: transmission}[name]()
         return
     out = Console()
     for part in _parts(name):
         lobe = LOBES[part]
         out.print(f"[bold]{part}[/bold]\n")
-        for paragraph in inspect.cleandoc(lobe.shape.__doc__ or "").split("\n\n"):
-            out.print(" ".join(paragraph.split()) + "\n", markup=False, highlight=False)
+        _prose(out, lobe.shape.__doc__)
         for law, words in lobe.breaks.items():
             out.print(f"Breaks the law '{law}' ({laws.LAWS[law]}): {words}.\n", markup=False, highlight=False)
         table = _table("parameter", "symbol", "range", "unit", "default", "channels", "meaning")
@@ -100,6 +104,12 @@ def page(name: str) -> None:
             unit = "" if p.unit == "1" else p.unit
             table.add_row(key, p.symbol, f"{p.lower:g} – {p.upper:g}", unit, f"{default:g}", spread, p.doc)
         out.print(table)
+
+
+def _prose(out: Console, text: str | None) -> None:
+    """The paragraphs of a docstring."""
+    for paragraph in inspect.cleandoc(text or "").split("\n\n"):
+        out.print(" ".join(paragraph.split()) + "\n", markup=False, highlight=False)
 
 
 def _parts(name: str) -> list[str]:
@@ -189,3 +199,26 @@ def fresnel_terms() -> None:
     for suffix in dict.fromkeys(suffix for variants in _families().values() for suffix in variants):
         term = next(lobe.parts["fresnel"] for name, lobe in LOBES.items() if name == "ggx" + suffix)
         out.print(f"{suffix}: {_first_line(term)}", markup=False, highlight=False)
+
+
+def transmission() -> None:
+    """Print the page of dielectric interfaces, and what one collision reflects and transmits, from either side."""
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+    from fitmat.models import interface
+
+    out, angles = Console(), (0.0, 30.0, 60.0, 80.0)
+    out.print("[bold]transmission[/bold]\n")
+    _prose(out, interface.__doc__)
+    table = _table("GGX, eta 1.5", *(f"{angle:g}°" for angle in angles))
+    for inside, side in ((False, "from above"), (True, "from below")):
+        smooth = interface.transmittance(np.deg2rad(angles), 1.0 / GLASS if inside else GLASS)
+        table.add_row(f"smooth, {side}: R + T", *(f"{1.0 - t:.3f} + {t:.3f}" for t in smooth))
+        for alpha in (0.1, 0.3, 1.0):
+            rough = interface.Surface("ggx", alpha, GLASS, transmits=True)
+            found = interface.albedo_interface(rough, np.deg2rad(angles), inside=inside)
+            shares = zip(found.reflected, found.transmitted, strict=True)
+            table.add_row(f"alpha {alpha:g}, {side}", *(f"{r:.3f} + {t:.3f}" for r, t in shares))
+    out.print(table)
+    out.print("\nWhat is missing from 1 meets the interface again: fitmat.albedo_walk follows it.", highlight=False)

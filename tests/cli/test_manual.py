@@ -51,6 +51,16 @@ def test_fresnel_page_ranks_the_terms(capsys):
     assert schlick > 0.1 > f82 > belcour
 
 
+def test_transmission_page_shows_what_glass_lets_through(capsys):
+    """A smooth face, normal incidence: 4 % back, 96 % on; out of glass at 60° nothing."""
+    manual.page("transmission")
+    out = capsys.readouterr().out
+    assert "Walter" in out
+    rows = [line for line in out.splitlines() if line.startswith("smooth, from")]
+    assert "0.040 + 0.960" in rows[0]
+    assert "1.000 + 0.000" in rows[1]
+
+
 @pytest.mark.study
 def test_check_prints_laws_and_names_surprises(capsys, monkeypatch):
     """blinn-phong breaks energy and says so; with its declaration removed it is named."""

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 NameFlag = Annotated[
-    str | None, typer.Argument(help="A lobe or model, e.g. ggx or lambert+ggx; 'fresnel' for the Fresnel terms.")
+    str | None,
+    typer.Argument(help="A lobe or model, e.g. ggx or lambert+ggx; 'fresnel' for the Fresnel terms; 'transmission'."),
 ]
 
 CheckFlag = Annotated[

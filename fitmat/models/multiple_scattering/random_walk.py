@@ -83,14 +83,14 @@ def evaluate_walk(
     )
 
 
-def albedo_walk(surface: Surface, wi: ArrayLike, *, samples: int, seed: int) -> Escaped:
+def albedo_walk(surface: Surface, wi: ArrayLike, *, samples: int, seed: int, order: int | None = None) -> Escaped:
     """Fractions of the light from each direction that leave the surface on either side.
 
     A surface that absorbs nothing gives 1 in total without any noise: each path ends on one side or the other.
     Arguments and errors as for `evaluate_walk`.
     """
-    refuse_kinds(surface, samples, seed, None)
-    plan = plan_paths(wi, wi, samples=samples, order=None)
+    refuse_kinds(surface, samples, seed, order)
+    plan = plan_paths(wi, wi, samples=samples, order=order)
     both = plan.result(
         _evaluate(surface, plan.wi, None, plan.orders, jax.random.key(seed, impl=GENERATOR), plan.static)
     )
@@ -130,7 +130,8 @@ def _evaluate(surface: Surface, wi: Array, wo: Array | None, orders: Orders, key
         goes_on = ~lost & (depth > 0.0)
         cut = goes_on & (bounces >= orders.last)
         if wo is None:
-            score = jnp.concatenate([weight * ~inside, weight[:1] * inside]) * (~lost & ~goes_on)
+            leaves = ~lost & ~goes_on & orders.include(bounces)
+            score = jnp.concatenate([weight * ~inside, weight[:1] * inside]) * leaves
         else:
             score = _next_event(surface, old, wo) * orders.include(bounces)
         omitted = weight.max(0) * (cut & (orders.counted == 0))

@@ -35,8 +35,28 @@ Colours = Float[Array, "c n w"]
 """One value per channel for each walker."""
 
 
+DISTRIBUTIONS: dict[str, AbstractDistribution] = {"ggx": GGX(), "beckmann": Beckmann()}
+
+
+def _as_distribution(given: Any) -> AbstractDistribution:
+    if isinstance(given, str) and given not in DISTRIBUTIONS:
+        raise ModelError(f"distribution {given!r}: expected {' or '.join(DISTRIBUTIONS)}.")
+    return DISTRIBUTIONS[given] if isinstance(given, str) else given
+
+
+def _as_fresnel(given: Any) -> AbstractFresnel:
+    if isinstance(given, AbstractFresnel) or not np.isscalar(given):
+        return given
+    eta = float(arguments.numbers("fresnel", given, single=True))
+    if not (np.isfinite(eta) and eta > 0.0):
+        raise ModelError(f"fresnel = {eta:g}: expected a Fresnel term, or the index of a dielectric, above 0.")
+    return Dielectric(jnp.asarray(eta))
+
+
 def _as_slopes(slopes: Any) -> Slopes:
     """Arrays, so that surfaces that differ in their slopes alone share a compiled program."""
+    if np.isscalar(slopes) and not isinstance(slopes, str):
+        slopes = (slopes, slopes)
     if not isinstance(slopes, Sequence | np.ndarray) or isinstance(slopes, str):
         arguments.refuse("slopes", slopes, "(alpha_x, alpha_y), each from 0.0001 to 2")
     values = tuple(a if isinstance(a, jax.Array) else jnp.asarray(arguments.numbers("slopes", a)) for a in slopes)
@@ -49,9 +69,9 @@ class Surface(eqx.Module):
     """A rough interface.
 
     Attributes:
-        distribution: `GGX` or `Beckmann`.
-        slopes: alpha_x along the x axis, alpha_y along the y axis; 0.0001 to 2.
-        fresnel: Reflectance of the facets.
+        distribution: "ggx" or "beckmann", or `GGX()` or `Beckmann()`.
+        slopes: alpha_x along the x axis, alpha_y along the y axis, or one alpha; 0.0001 to 2.
+        fresnel: Reflectance of the facets: a Fresnel term, or a number, the index of a dielectric.
         transmits: Whether what a facet does not reflect is refracted through it (needs `Dielectric` with one eta)
             and may come back; otherwise it is absorbed.
 
@@ -59,9 +79,9 @@ class Surface(eqx.Module):
         ModelError: an attribute is not of these.
     """
 
-    distribution: AbstractDistribution
+    distribution: AbstractDistribution = eqx.field(converter=_as_distribution)
     slopes: Slopes = eqx.field(converter=_as_slopes)
-    fresnel: AbstractFresnel
+    fresnel: AbstractFresnel = eqx.field(converter=_as_fresnel)
     transmits: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self) -> None:
@@ -174,8 +194,9 @@ def visible_normal(surface: Surface, w: Walkers3, u: tuple[Walker, Walker]) -> W
     if isinstance(surface.distribution, GGX):
         m = _ggx_normal(stretched, u)
     else:
-        sin = jnp.sqrt(jnp.maximum(stretched[0] ** 2 + stretched[1] ** 2, 1e-300))
-        cos_phi, sin_phi = stretched[0] / sin, stretched[1] / sin
+        square = stretched[0] ** 2 + stretched[1] ** 2
+        sin = jnp.sqrt(jnp.maximum(square, 1e-300))
+        cos_phi, sin_phi = jnp.where(square > 1e-300, stretched[0] / sin, 1.0), stretched[1] / sin
         along, across = _beckmann_slopes(sin, stretched[2], u)
         m = jnp.stack([sin_phi * across - cos_phi * along, -sin_phi * along - cos_phi * across, jnp.ones_like(along)])
     return _unit(jnp.stack([ax * m[0], ay * m[1], jnp.maximum(m[2], 1e-300)]))
