@@ -123,6 +123,11 @@ class Coordinates:
         """Unbounded coordinates (k,) to a parameter vector (p,), always within the bounds."""
         return self.filled(base, jnp.asarray(self.low) + self.span * (1.0 + jnp.sin(u)) / 2.0)
 
+    def folded(self, natural: Float[np.ndarray, "... k"]) -> Float[np.ndarray, "... k"]:
+        """Natural coordinates mirrored at the bounds until they lie between them."""
+        turn = (natural - self.low) % (2.0 * self.span)
+        return self.low + np.where(turn > self.span, 2.0 * self.span - turn, turn)
+
     def side(self, values: Float[np.ndarray, "... p"]) -> np.ndarray:
         """Which of the k parameters sit on a bound: −1 lower, +1 upper, 0 inside."""
         t = (self.natural(values) - self.low) / self.span

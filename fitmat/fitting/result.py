@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.fitting.coordinates import Coordinates, coordinates
+from fitmat.fitting.correlation import Correlation, correlate
 from fitmat.fitting.information import FOLLOWS, MISSES, covariance, information
 from fitmat.fitting.likelihood import Data, best_discrepancy, first_discrepancy
 from fitmat.fitting.losses import DEFAULT, Loss
@@ -57,7 +58,8 @@ class Fit:
         n_starts_agreeing: How many of them found the best optimum.
         log_likelihood: At the optimum, what the prior adds included.
         information: Of the natural coordinates (logarithm where the scale is log), (p, p).
-        covariance: Of all physical parameters, (p, p); 0 for fixed ones, NaN for those on a bound.
+        likelihood_covariance: Of all physical parameters, if every sample's misfit were its own, (p, p); 0 for fixed
+            ones, NaN for those on a bound.
         undetermined: Names of parameters that these data do not determine.
         n_values: Values that were fitted; more than `measurements` holds where these are a part of a large file.
         misfit: The same spread of ∛(f cosθ_i) by the default likelihood, whatever the loss.
@@ -77,7 +79,7 @@ class Fit:
     n_starts_agreeing: int
     log_likelihood: float
     information: Float[np.ndarray, "p p"]
-    covariance: Float[np.ndarray, "p p"]
+    likelihood_covariance: Float[np.ndarray, "p p"]
     undetermined: tuple[str, ...]
     n_values: int
     misfit: float
@@ -104,6 +106,32 @@ class Fit:
     def free(self) -> np.ndarray:
         """Indices of the parameters that were fitted."""
         return self.coordinates.index
+
+    @functools.cached_property
+    def correlation(self) -> Correlation:
+        """How alike the misfits of neighbouring geometries are, and what follows for everything that is quoted."""
+        return correlate(self.model, self.data, self.discrepancy, self.coordinates, self.information, self.n_values)
+
+    @functools.cached_property
+    def covariance(self) -> Float[np.ndarray, "p p"]:
+        """Of all physical parameters, the misfit's correlation included; 0 for fixed ones, NaN for those on a bound."""
+        found, moved = np.array(self.likelihood_covariance), self.coordinates
+        if not (self.finite and self.correlation.found):
+            return found
+        inside = moved.side(self.values) == 0
+        slope, place = moved.slope(self.values)[inside], moved.index[inside]
+        stretch = self.correlation.stretch[np.ix_(inside, inside)] * np.divide.outer(slope, slope)
+        found[np.ix_(place, place)] = stretch @ found[np.ix_(place, place)] @ stretch.T
+        return found
+
+    def widened(self, values: Float[np.ndarray, "m p"]) -> Float[np.ndarray, "m p"]:
+        """Draws from the likelihood, physical, as far from the best fit as the correlation of the misfit asks."""
+        if not self.correlation.found:
+            return values
+        moved = self.coordinates
+        centre = moved.natural(self.values)
+        away = (moved.natural(values) - centre) @ self.correlation.stretch.T
+        return moved.filled(self.values, moved.folded(centre + away))
 
     @functools.cached_property
     def on_bound(self) -> dict[str, str]:
@@ -226,7 +254,7 @@ def conclude(
         n_starts_agreeing=int(np.count_nonzero(scores > scores[k] - AGREE)) if usable[k] else 0,
         log_likelihood=float(ends.log_likelihood[k]),
         information=known,
-        covariance=spread,
+        likelihood_covariance=spread,
         undetermined=undetermined,
         n_values=int(np.count_nonzero(data.weight)),
         misfit=s if data.loss.infers_discrepancy else _misfit(best, data),

@@ -216,7 +216,7 @@ def _concluded(file: _File, around: Range, top: _Top) -> Fit:
         steps=start.steps + top.passes,
         log_likelihood=-float(top.sums.cost),
         information=information,
-        covariance=spread,
+        likelihood_covariance=spread,
         undetermined=undetermined,
         n_values=file.rows.chunks.n_valid,
         misfit=s,

@@ -39,6 +39,11 @@ GRAZING = np.deg2rad(70.0)
 """Zenith angle of light or sensor beyond which a geometry is grazing."""
 
 
+CONTRADICTED = "The intervals hold only if the model and the noise are right, which these data contradict."
+
+ALLOWED = "The intervals allow for that: other angles of the same range would give parameters within them."
+
+
 @dataclasses.dataclass(frozen=True)
 class Doubts:
     """What speaks against a fit's intervals.
@@ -46,10 +51,13 @@ class Doubts:
     Attributes:
         words: One sentence each; empty where nothing does.
         inadequate: Whether the intervals must not be quoted as if the model were true.
+        intervals_hold: Whether nothing speaks against the intervals; a model that misses the data does not where the
+            correlation of its misfit was found, for they allow for that.
     """
 
     words: tuple[str, ...]
     inadequate: bool
+    intervals_hold: bool
 
     def __str__(self) -> str:
         """All sentences."""
@@ -66,7 +74,7 @@ def find_doubts(fit: Fit) -> Doubts:
         `Doubts`; what a user should know first comes first.
     """
     if not fit.finite:
-        return Doubts((f"{fit.name} {fit.adequacy}.",), True)
+        return Doubts((f"{fit.name} {fit.adequacy}.",), True, False)
     clashes, identical = _contradictions(fit), _identical(fit)
     noise = [] if identical else _doubtful_noise(fit)
     missed = fit.noise.known and fit.misfit_ratio >= MISSES
@@ -76,10 +84,11 @@ def find_doubts(fit: Fit) -> Doubts:
         words.insert(0, f"{fit.name} is inadequate: it misses the data by {ratio}; {_pattern(fit)}.")
     elif not fit.noise.known:
         words.append(f"Whether {fit.name} is adequate cannot be judged: the noise is not known.")
-    inadequate = bool(missed or noise or identical or (clashes and not fit.loss.robust))
-    if inadequate and fit.loss.posterior:
-        words.append("The intervals hold only if the model and the noise are right, which these data contradict.")
-    return Doubts(tuple(words), inadequate)
+    contradicted = bool(noise or identical or (clashes and not fit.loss.robust))
+    allowed = fit.loss.posterior and not contradicted and fit.correlation.found
+    if (missed or contradicted) and fit.loss.posterior:
+        words.append(ALLOWED if allowed else CONTRADICTED)
+    return Doubts(tuple(words), missed or contradicted, not contradicted and (allowed or not missed))
 
 
 def _identical(fit: Fit) -> list[str]:

@@ -48,7 +48,7 @@ def weigh(posterior: Posterior) -> Evidence | None:
     used = np.asarray(fit.data.weight) > 0
     if int(used.sum()) > MOST_LEFT_OUT or fit.n_values > MOST_LEFT_OUT:
         return None
-    draws, s = posterior.thinned(LEFT_OUT_DRAWS)
+    draws, s = posterior.thinned(LEFT_OUT_DRAWS, widened=False)
     data, logs = fit.data, np.empty((len(s), int(used.sum())))
     for part, x, noise, spread in predictions(fit, draws, s):
         logs[part] = log_pointwise(x, noise, data, spread)[:, used]

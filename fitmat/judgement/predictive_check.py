@@ -127,7 +127,8 @@ def check_predictions(posterior: Posterior, *, seed: int) -> PredictiveCheck:
     highest, top = np.array([y[g.rows].max() for g in groups]), np.zeros(len(y))
     for group, value in zip(groups, highest, strict=True):
         top[group.rows] = value
-    draws, s = posterior.thinned(int(np.clip(MOST_NUMBERS / used.size, FEWEST_DRAWS, REPLICATED_DRAWS)))
+    count = int(np.clip(MOST_NUMBERS / used.size, FEWEST_DRAWS, REPLICATED_DRAWS))
+    draws, s = posterior.thinned(count, widened=False)
     look = Replicates(fit, used, groups, rng, *_seen(fit, draws, s, top))
     found = [*look.whole(), *look.peaks(highest, s), *look.patterns(), *look.sides()]
     adjusted = adjusted_for_many(np.array([f.p for f in found]))

@@ -22,7 +22,7 @@ from fitmat.match.imitation import Imitation, imitate
 from fitmat.match.sentences import CLOSE as CLOSE
 from fitmat.match.sentences import SIMILAR as SIMILAR
 from fitmat.match.sentences import STRONG_EVIDENCE as STRONG_EVIDENCE
-from fitmat.measurements.incidences import incidences
+from fitmat.measurements.incidences import incidence_range, incidences
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
 from fitmat.models.registry import LOBES, lobe_names
 from fitmat.text import brief
@@ -117,12 +117,21 @@ class Match:
             sentences.distance_sentence(names, self.measured_distance, self.hemisphere_distance, self.distances.beyond),
             sentences.telling_sentence(names, self.telling),
             sentences.grazing_sentence(names, self.distances.grazing_excess, self.ablation),
-            sentences.gap_sentence(names, self.albedo_gap_max, self.albedo_gap_sign, self.albedo_gap_theta_i_deg),
+            sentences.gap_sentence(
+                names, self.albedo_gap_max, self.albedo_gap_sign, self.albedo_gap_theta_i_deg, self.incidence_range_deg
+            ),
             None if self.perceived is None else self.perceived.words,
             sentences.evidence_sentence(names, self.delta_bic),
             f"{names[0]} {self.empirical.fit.adequacy}; {names[1]} {self.microfacet.fit.adequacy}.",
         ]
         return " ".join([sentence for sentence in found if sentence] + self._cautions(names))
+
+    @property
+    def incidence_range_deg(self) -> tuple[float, float]:
+        """Between which incidences was measured; beyond, everything is extrapolated."""
+        m = self.empirical.fit.measurements
+        low, high = np.rad2deg(incidence_range(m.wi, np.any(m.valid, axis=1)))
+        return float(low), float(high)
 
     def _cautions(self, names: tuple[str, str]) -> list[str]:
         """What is impossible, undetermined or unfinished."""

@@ -8,6 +8,7 @@ import math
 
 from fitmat.match.ablation import TERMS, Ablation
 from fitmat.match.discernibility import SEPARATED, Telling
+from fitmat.match.distances import WITHIN
 from fitmat.match.regions import GRAZING_DEG
 from fitmat.uncertainty.estimate import Estimate
 
@@ -89,13 +90,14 @@ def grazing_sentence(names: Names, excess: Estimate, ablation: Ablation | None) 
     )
 
 
-def gap_sentence(names: Names, gap: Estimate, sign: int, theta_i_deg: float) -> str:
-    """The largest difference of the albedos and where it is."""
+def gap_sentence(names: Names, gap: Estimate, sign: int, theta_i_deg: float, measured_deg: tuple[float, float]) -> str:
+    """The largest difference of the albedos, where it is, and whether that is an extrapolation."""
     side = "less" if sign < 0 else "more"
-    return (
-        f"At {theta_i_deg:.0f}° incidence {names[0]} reflects {100 * gap.value:.1f} % of the light "
-        f"{side} than {names[1]}"
-        + (f" ({100 * gap.ci95[0]:.1f}–{100 * gap.ci95[1]:.1f} %)." if gap.has_interval else ".")
+    near = math.degrees(WITHIN)
+    within = measured_deg[0] - near <= theta_i_deg <= measured_deg[1] + near
+    where = f"At {theta_i_deg:.0f}° incidence{'' if within else ', which is extrapolated,'}"
+    return f"{where} {names[0]} reflects {100 * gap.value:.1f} % of the light {side} than {names[1]}" + (
+        f" ({100 * gap.ci95[0]:.1f}–{100 * gap.ci95[1]:.1f} %)." if gap.has_interval else "."
     )
 
 

@@ -63,3 +63,9 @@ def incidences(
         inside = order[first[group[0]] : np.append(first, len(order))[group[-1] + 1]]
         found.append(Incidence(name, float(np.round(degrees[inside].mean(), 6)), rows[np.sort(inside)]))
     return tuple(found)
+
+
+def incidence_range(wi: Float[np.ndarray, "n 3"], used: Bool[np.ndarray, " n"]) -> tuple[float, float]:
+    """Smallest and largest angle of incidence of the samples that count, radians; not both 0 only if there are any."""
+    angles = zenith(wi[used])
+    return float(angles.min(initial=np.pi / 2)), float(angles.max(initial=0.0))

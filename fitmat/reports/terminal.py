@@ -67,6 +67,8 @@ def _remark(out: Console, found: Findings) -> None:
         _say(out, ("interrupted", "yellow"), ": sampling was stopped; what was done is kept.")
     if against.words:
         _say(out, ("in doubt" if against.inadequate else "note", "yellow"), f": {against}")
+    if found.scope:
+        _say(out, found.scope)
     for said in (found.identifiability, found.second_opinion):
         if said is not None:
             _say(out, said.words)
@@ -76,7 +78,7 @@ def _title(found: Findings) -> str:
     posterior, fit = found.posterior, found.fit
     agreeing = f"{fit.n_starts_agreeing} of {fit.n_starts} starts agree"
     ending = f"posterior {posterior.verdict}" if fit.loss.posterior else f"loss {fit.loss.name}, no posterior"
-    against = ", intervals in doubt" if found.doubts.inadequate else ""
+    against = "" if found.doubts.intervals_hold else ", intervals in doubt"
     return f"{fit.name}: {fit.result}, {agreeing}, {ending}{against}"
 
 

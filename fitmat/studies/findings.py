@@ -16,6 +16,7 @@ from fitmat.judgement.fit_metrics import fit_metrics
 from fitmat.judgement.identifiability.verdicts import Identifiability
 from fitmat.judgement.prediction import Section, standardised_residuals
 from fitmat.judgement.predictive_check import PredictiveCheck
+from fitmat.judgement.scope import describe_scope
 from fitmat.studies.curves import Curve, predict_curves
 from fitmat.text import brief
 from fitmat.uncertainty.posterior import Posterior
@@ -49,6 +50,7 @@ class Findings:
         parameters: As people read them.
         derived: What follows from them.
         doubts: What speaks against the intervals.
+        scope: What the intervals are about, as sentences.
         metrics: Name → distance from the measurements.
         priors: Parameter → what was believed of it before, as text, one for each channel.
         learnt: What the data added, for each fitted parameter.
@@ -63,6 +65,7 @@ class Findings:
     parameters: tuple[Quantity, ...]
     derived: tuple[Quantity, ...]
     doubts: Doubts
+    scope: str
     metrics: Mapping[str, float | None]
     priors: Mapping[str, tuple[str, ...]]
     learnt: tuple[Learnt, ...]
@@ -106,6 +109,7 @@ def find(
         parameters=tuple(fitted),
         derived=tuple(derived(posterior, fitted)),
         doubts=find_doubts(fit),
+        scope=describe_scope(fit),
         metrics=fit_metrics(fit),
         priors=priors.words(fit.model, fit.data.prior),
         learnt=_learnt(posterior),

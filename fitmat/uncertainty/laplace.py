@@ -130,11 +130,8 @@ def gaussian(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
 def draws(fit: Fit, count: int, rng: np.random.Generator) -> Float[np.ndarray, "count d"]:
     """Gaussian draws of the sampled coordinates, folded at the bounds of the parameters."""
     moved = sampled(fit)
-    low, high = moved.low, moved.high
     natural = moved.unscaled(rng.multivariate_normal(*gaussian(fit), size=count, method="eigh"))
-    turn = (natural[:, :-1] - low) % (2 * (high - low))
-    folded = low + np.where(turn > high - low, 2 * (high - low) - turn, turn)
-    return moved.scaled(np.column_stack([folded, np.abs(natural[:, -1])]))
+    return moved.scaled(np.column_stack([moved.folded(natural[:, :-1]), np.abs(natural[:, -1])]))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -4,6 +4,7 @@ Draws nothing itself; `chains` and `laplace` do.
 """
 
 import dataclasses
+import functools
 import io
 import json
 from pathlib import Path
@@ -82,9 +83,9 @@ class Posterior:
     Attributes:
         fit: What was sampled.
         method: "laplace" or "emcee".
-        values: Physical parameter vectors, (m, p), fixed parameters included.
+        drawn: Physical parameter vectors as the density has them, (m, p), fixed parameters included; see `values`.
         discrepancy: s of each draw, (m,).
-        chain: For emcee, the same before flattening, (steps, walkers, free + 1), physical; else None.
+        chain: For emcee, `drawn` and s before flattening, (steps, walkers, free + 1), physical; else None.
         diagnostics: For emcee; else None.
         interrupted: Whether the user stopped the sampling.
         pareto_k: k̂ of the weights by which Laplace's draws were corrected; None where that was not tried.
@@ -92,7 +93,7 @@ class Posterior:
 
     fit: Fit
     method: str
-    values: Float[np.ndarray, "m p"]
+    drawn: Float[np.ndarray, "m p"]
     discrepancy: Float[np.ndarray, " m"]
     chain: np.ndarray | None = None
     diagnostics: Diagnostics | None = None
@@ -100,6 +101,11 @@ class Posterior:
     pareto_k: float | None = None
 
     __repr__ = brief
+
+    @functools.cached_property
+    def values(self) -> Float[np.ndarray, "m p"]:
+        """What everything that is quoted rests on: `drawn`, widened as the correlation of the misfit asks, (m, p)."""
+        return self.fit.widened(self.drawn)
 
     @property
     def verdict(self) -> str:
@@ -158,10 +164,15 @@ class Posterior:
         """Interval of each parameter that holds the posterior with a probability, by `estimate.limits`."""
         return limits(self.fit.values, self.values, level).T
 
-    def thinned(self, count: int) -> tuple[Float[np.ndarray, "k p"], Float[np.ndarray, " k"]]:
-        """At most `count` draws spread evenly over the run: parameter vectors and discrepancies."""
-        chosen = np.linspace(0, len(self.values) - 1, min(count, len(self.values))).astype(int)
-        return self.values[chosen], self.discrepancy[chosen]
+    def thinned(self, count: int, *, widened: bool = True) -> tuple[Float[np.ndarray, "k p"], Float[np.ndarray, " k"]]:
+        """At most `count` draws spread evenly over the run: parameter vectors and discrepancies.
+
+        Args:
+            count: How many.
+            widened: Whether to take `values`; else `drawn`, for what asks the density itself.
+        """
+        chosen = np.linspace(0, len(self.drawn) - 1, min(count, len(self.drawn))).astype(int)
+        return (self.values if widened else self.drawn)[chosen], self.discrepancy[chosen]
 
     def table(self) -> pl.DataFrame:
         """The draws as a table: chain (walker), draw (step), each free parameter (and channel), discrepancy."""
@@ -214,11 +225,9 @@ class Posterior:
     def _free(self) -> tuple[list[tuple[Entry, np.ndarray]], np.ndarray]:
         """Free parameters with their draws, (chains, draws, size), and s, (chains, draws)."""
         free = [e for e in self.fit.entries if e.name not in self.fit.held]
-        if self.chain is None:
-            return [(e, self.values[None, :, e.place]) for e in free], self.discrepancy[None]
-        chain = np.swapaxes(self.chain, 0, 1)
-        ends = np.cumsum([e.size for e in free])
-        return list(zip(free, np.split(chain, ends, axis=-1), strict=False)), chain[..., -1]
+        steps = (len(self.values), 1) if self.chain is None else self.chain.shape[:2]
+        values = np.swapaxes(self.values.reshape(*steps, -1), 0, 1)
+        return [(e, values[..., e.place]) for e in free], self.discrepancy.reshape(steps).T
 
     def _channels(self, entry: Entry, part: np.ndarray) -> list[tuple[str, np.ndarray]]:
         """The draws of a parameter channel by channel, each with its name."""

@@ -33,6 +33,9 @@ SAME = 1e-4
 SAME_COVARIANCE = 1e-5
 """Relative; where exponent ± 3 % differs by `SAME` of its standard deviation, its curvature differs by this."""
 
+PART_OF_THE_ROWS = 0.25
+"""Relative, of variances: other rows stand for all where the correlation of the misfit is asked."""
+
 SAME_LIKELIHOOD = 1e-6
 """Absolute, of some 10⁵ to 10⁶: rounding of a sum in another order."""
 
@@ -64,13 +67,14 @@ def saved(m: fm.Measurements, path: Path) -> Path:
 def deviations(found: Fit, whole: Fit) -> np.ndarray:
     """Differences of the free parameters in standard deviations."""
     free = whole.free
-    return (found.values - whole.values)[free] / np.sqrt(np.diagonal(whole.covariance))[free]
+    return (found.values - whole.values)[free] / np.sqrt(np.diagonal(whole.likelihood_covariance))[free]
 
 
 def assert_same(found: Fit, whole: Fit) -> None:
     assert (found.result, found.undetermined) == (whole.result, whole.undetermined)
     assert np.abs(deviations(found, whole)).max() < SAME
-    np.testing.assert_allclose(found.covariance, whole.covariance, rtol=SAME_COVARIANCE)
+    np.testing.assert_allclose(found.likelihood_covariance, whole.likelihood_covariance, rtol=SAME_COVARIANCE)
+    np.testing.assert_allclose(found.correlation.inflation, whole.correlation.inflation, rtol=PART_OF_THE_ROWS)
     assert found.discrepancy == pytest.approx(whole.discrepancy, rel=SAME_COVARIANCE)
     assert found.log_likelihood == pytest.approx(whole.log_likelihood, rel=0, abs=SAME_LIKELIHOOD)
     assert found.information.shape == whole.information.shape

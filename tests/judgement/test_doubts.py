@@ -7,7 +7,7 @@ import pytest
 from selection import always
 
 import fitmat as fm
-from fitmat.judgement.doubts import find_doubts
+from fitmat.judgement.doubts import ALLOWED, find_doubts
 
 ANGLES = np.deg2rad([10.0, 30.0, 50.0, 70.0]), np.deg2rad(np.arange(-80.0, 81.0, 2.0))
 CAUTION = "The intervals hold only if the model and the noise are right, which these data contradict."
@@ -39,6 +39,7 @@ def test_contradictory_repeats_are_named(made: fm.Measurements) -> None:
     value[-1] += 10 * np.sqrt(2) * made.sigma[row]
     found = find_doubts(fm.fit(changed(doubled, value), "lambert+ggx"))
     assert found.inadequate
+    assert not found.intervals_hold
     assert found.words[0].startswith("Two measurements of one geometry (θᵢ 10°, θₒ 0°) differ by 10 times their noise")
     assert found.words[-1] == CAUTION
 
@@ -66,7 +67,8 @@ def test_retro_reflection_is_recognised(made: fm.Measurements, loss: str) -> Non
     assert found.inadequate
     assert "lambert+ggx is inadequate: it misses the data by " in found.words[0]
     assert "back towards the light (retro-reflection), where it is too dark" in found.words[0]
-    assert found.words[-1] == CAUTION
+    assert found.words[-1] == ALLOWED
+    assert found.intervals_hold
 
 
 @pytest.mark.study

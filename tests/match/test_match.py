@@ -193,9 +193,11 @@ def test_the_verdict_names_the_evidence(match: Match, delta_bic: float, words: s
 
 
 def test_the_verdict_names_the_gap_in_albedo(match: Match) -> None:
-    gap = {"albedo_gap_max": Estimate(0.123, (0.1, 0.15)), "albedo_gap_theta_i_deg": 75.0, "albedo_gap_sign": -1}
-    words = "At 75° incidence blinn-phong reflects 12.3 % of the light less than ggx (10.0–15.0 %)."
+    gap = {"albedo_gap_max": Estimate(0.123, (0.1, 0.15)), "albedo_gap_theta_i_deg": 70.0, "albedo_gap_sign": -1}
+    words = "At 70° incidence blinn-phong reflects 12.3 % of the light less than ggx (10.0–15.0 %)."
     assert words in dataclasses.replace(match, **gap).verdict
+    beyond = dataclasses.replace(match, **{**gap, "albedo_gap_theta_i_deg": 75.0})
+    assert "At 75° incidence, which is extrapolated, blinn-phong reflects 12.3 %" in beyond.verdict
     assert words.replace("less", "more") in dataclasses.replace(match, **{**gap, "albedo_gap_sign": 1}).verdict
 
 

@@ -187,7 +187,9 @@ def test_json_lists_channels_and_not_what_they_share(studied):
 
 def test_json_has_null_for_what_is_not_finite(studied):
     posterior = studied.posteriors[0]
-    fit = dataclasses.replace(posterior.fit, log_likelihood=math.nan, covariance=posterior.fit.covariance * math.inf)
+    fit = dataclasses.replace(
+        posterior.fit, log_likelihood=math.nan, likelihood_covariance=posterior.fit.covariance * math.inf
+    )
     found: dict[str, Any] = record.to_dict(alone(dataclasses.replace(posterior, fit=fit)))
     text = json.dumps(found, allow_nan=False)
     assert json.loads(text)["fits"][0]["bic"] is None
@@ -492,5 +494,5 @@ def test_corner_of_one_parameter_marks_the_best_fit(studied):
 def test_corner_of_constant_draws(studied):
     """A chain that never moved is drawn, not refused."""
     posterior = studied.posteriors[1]
-    still = dataclasses.replace(posterior, values=np.repeat(posterior.values[:1], 100, axis=0))
+    still = dataclasses.replace(posterior, drawn=np.repeat(posterior.drawn[:1], 100, axis=0))
     assert len(plot.corner(still).axes) == 8**2

@@ -69,7 +69,7 @@ def _states(found: Study) -> Iterator[str]:
         missed = one.fit.adequacy.startswith("inadequate")
         if missed and not one.doubts.inadequate:
             yield f"{one.name}: inadequate without a doubt"
-        if one.doubts.inadequate != any("intervals hold only if" in words for words in one.doubts.words):
+        if one.doubts.intervals_hold == any("intervals hold only if" in words for words in one.doubts.words):
             yield f"{one.name}: in doubt, but not said"
 
 

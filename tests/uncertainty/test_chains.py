@@ -238,7 +238,7 @@ def test_thinning_spreads_over_the_run(sampled: Posterior) -> None:
     assert values.shape == (10, 4)
     assert s.shape == (10,)
     np.testing.assert_array_equal(values[[0, -1]], sampled.values[[0, -1]])
-    assert len(dataclasses.replace(sampled, values=sampled.values[:3]).thinned(10)[0]) == 3
+    assert len(dataclasses.replace(sampled, drawn=sampled.drawn[:3]).thinned(10)[0]) == 3
 
 
 def test_draws_are_saved_as_a_table(fit: Fit, sampled: Posterior, tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ def draws(fit: Fit, name: str, values: dict[str, Any]) -> Posterior:
     centre = np.array(list(values.values()))
     spread = np.exp(0.1 * np.random.default_rng(1).normal(size=(2000, len(centre))))
     covariance = np.diag((0.1 * centre) ** 2)
-    other = dataclasses.replace(fit, name=name, model=fm.model(name, **values), covariance=covariance)
+    other = dataclasses.replace(fit, name=name, model=fm.model(name, **values), likelihood_covariance=covariance)
     return Posterior(other, "laplace", centre * spread, np.full(2000, 0.01))
 
 
@@ -66,7 +66,7 @@ def test_laplace_intervals_are_taken_where_the_parameter_lives(fit: Fit) -> None
 
 
 def test_laplace_intervals_end_at_the_bounds(fit: Fit) -> None:
-    wide = dataclasses.replace(fit, covariance=np.diag([1.0, 100.0, 0.5, 1e4]))
+    wide = dataclasses.replace(fit, likelihood_covariance=np.diag([1.0, 100.0, 0.5, 1e4]))
     found = named(parameters(Posterior(wide, "laplace", fit.values[None], np.zeros(1))))
     assert found["kd"].ci95.tolist() == [[0.0, 1.0]]
     assert found["ks"].ci95.tolist() == [[0.0, 10.0]]

@@ -1,6 +1,8 @@
 """Designs: which next measurement would tell most about a parameter, about all, or about which of two models is right.
 
-It measures nothing and refits nothing: what it expects holds where the model does, with s as the fit found it.
+It measures nothing and refits nothing: what it expects holds where the model does, with s as the fit found it. Where
+the misfits of neighbours are alike, gains are those of the likelihood, and standard deviations are wider by the same
+factor before and after.
 
 Each candidate is put to a bank of Kalman filters, one for each Gaussian of the `ridge` (the Gaussian sum of Alspach &
 Sorenson, IEEE Trans. Automatic Control 17, 1972), with several points of the ridge taken for the truth in turn. What
@@ -150,18 +152,19 @@ def next_angles(
     history: list[int] = []
     proposals: list[Proposal] = []
     gains = np.zeros(0)
+    wider = np.sqrt(fit.correlation.inflation)
     before, start = _expected(banks, task, looked, history, blank=True)
     for _ in range(count):
         score, sd = _expected(banks, task, looked, history)
         score = np.where(looked.near(history, APART), -np.inf, score)
         gain = np.sqrt(np.maximum(score, 0.0)) if match else np.exp(score - before)
         best = int(np.argmax(score))
-        proposals.append(_proposal(looked, best, repeats, float(gain[best]), sd[best]))
+        proposals.append(_proposal(looked, best, repeats, float(gain[best]), wider * sd[best]))
         gains = gains if history else gain
         before = score[best]
         history.append(best)
     truths = np.asarray(banks[0].centre)[np.asarray(banks[0].truths)]
-    sd = np.sqrt(np.mean(start[0] ** 2, axis=0))
+    sd = wider * np.sqrt(np.mean(start[0] ** 2, axis=0))
     known = (fit, fits[-1] if match else None, target, kind, fit.coordinates.names, sd, truths)
     return Design(*known, tuple(proposals), looked, gains)
 

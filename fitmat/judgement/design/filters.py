@@ -53,7 +53,7 @@ class Task(eqx.Module):
 
 def bank(fit: Fit) -> Bank:
     """The filters of a fit, and truths of equal probability along its ridge."""
-    found: Ridge = ridge(fit, profiles(fit))
+    found: Ridge = ridge(fit, profiles(fit, widened=False), widened=False)
     middles = (np.arange(TRUTHS) + 0.5) / TRUTHS
     truths = np.minimum(np.searchsorted(np.cumsum(found.weight), middles), len(found.weight) - 1)
     arrays = (np.asarray(fit.discrepancy), np.log(found.weight + 1e-300), found.centre, found.covariance, truths)

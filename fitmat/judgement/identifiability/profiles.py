@@ -83,7 +83,7 @@ class Profile:
         return (self.interval[1] - self.interval[0]) / (2 * LEVEL)
 
 
-def profiles(fit: Fit) -> tuple[Profile, ...]:
+def profiles(fit: Fit, *, widened: bool = True) -> tuple[Profile, ...]:
     """The profile likelihood of every free parameter.
 
     From the best fit outwards on both sides, each point starts where the last one ended; steps are chosen so that
@@ -92,13 +92,15 @@ def profiles(fit: Fit) -> tuple[Profile, ...]:
 
     Args:
         fit: A fit with a finite optimum.
+        widened: Whether the likelihood is as flat as the correlation of the misfit asks, ℓ(θ̂ + A⁻¹(θ − θ̂)), so that it
+            falls as the widened draws scatter (Chandler & Bate, Biometrika 94, 2007, "horizontal" adjustment).
 
     Returns:
         One `Profile` per free parameter, in the order of `fit.free`; none where all are fixed.
     """
     if not len(fit.free) or not fit.finite:
         return ()
-    moved, surface = fit.coordinates, _Surface(fit)
+    moved, surface = fit.coordinates, _Surface(fit, widened)
     low, high, span, best = moved.low, moved.high, moved.span, surface.best
     held = np.repeat(np.arange(moved.count), 2)
     sign, each = np.tile([-1.0, 1.0], moved.count), np.arange(2 * moved.count)
@@ -131,7 +133,9 @@ def profiles(fit: Fit) -> tuple[Profile, ...]:
     return tuple(result)
 
 
-def along(fit: Fit, place: int, held: Float[np.ndarray, " m"], guess: Float[np.ndarray, "m f"]) -> Points:
+def along(
+    fit: Fit, place: int, held: Float[np.ndarray, " m"], guess: Float[np.ndarray, "m f"], *, widened: bool = True
+) -> Points:
     """The profile of one parameter at given natural values.
 
     Args:
@@ -139,10 +143,11 @@ def along(fit: Fit, place: int, held: Float[np.ndarray, " m"], guess: Float[np.n
         place: Of the parameter among the free ones.
         held: Its values.
         guess: Roughly where the free parameters are there, natural, (m, f).
+        widened: Whether it is as flat as the correlation of the misfit asks.
     """
     t = np.clip(guess, fit.coordinates.low, fit.coordinates.high)
     t[:, place] = held
-    return _Surface(fit).settled(t, np.full(len(held), place))
+    return _Surface(fit, widened).settled(t, np.full(len(held), place))
 
 
 class _Surface:
@@ -153,17 +158,19 @@ class _Surface:
         gram: JᵀJ there, (f, f).
     """
 
-    def __init__(self, fit: Fit) -> None:
+    def __init__(self, fit: Fit, widened: bool) -> None:
         self._fit, self._data, self._moved = fit, representative(fit), fit.coordinates
         self.best = np.clip(self._moved.natural(fit.values), self._moved.low, self._moved.high)
+        self._back = np.linalg.inv(fit.correlation.stretch) if widened else np.eye(self._moved.count)
         square, _, gram = self._at(self.best[None])
         self._square, self.gram = square[0], gram[0]
 
     def _at(self, t: Float[np.ndarray, "m f"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        t = np.clip(self.best + (t - self.best) @ self._back.T, self._moved.low, self._moved.high)
         values, free = self._moved.filled(self._fit.values, t), self._fit.free
         natural = coordinates(self._fit.model).natural(values)
         square, slope, gram = normal_equations_at(self._fit.model, self._data, natural, self._fit.discrepancy)
-        return square, slope[:, free], gram[:, free[:, None], free]
+        return square, slope[:, free] @ self._back, self._back.T @ gram[:, free[:, None], free] @ self._back
 
     def settled(self, t: Float[np.ndarray, "m f"], held: np.ndarray) -> Points:
         """The optima of the other parameters from t on, with one parameter of each point held; kept in the bounds.

@@ -77,7 +77,7 @@ class Ridge:
         return moved.filled(self.fit.values, np.clip(natural, moved.low, moved.high))
 
 
-def ridge(fit: Fit, profiled: tuple[Profile, ...]) -> Ridge:
+def ridge(fit: Fit, profiled: tuple[Profile, ...], *, widened: bool = True) -> Ridge:
     """The posterior along its least determined parameter, with flat priors where the fit has no others.
 
     The weight of a point is Laplace's approximation of the marginal density there (Tierney & Kadane 1986, eq. 4.1):
@@ -87,12 +87,13 @@ def ridge(fit: Fit, profiled: tuple[Profile, ...]) -> Ridge:
     Args:
         fit: Of at least one free parameter.
         profiled: From `profiles`.
+        widened: As there.
     """
     prior = natural_sd(fit.model, fit.data.prior)[fit.free]
     filling = np.array([p.sd for p in profiled]) / prior
     place = int(np.argmax(filling))
     held, guess = _spaced(profiled, filling, place, prior)
-    points = along(fit, place, held, guess)
+    points = along(fit, place, held, guess, widened=widened)
     others = np.delete(np.arange(len(prior)), place)
     stiff = points.information[:, others][:, :, others] + np.diag(prior[others] ** -2.0)
     width = np.gradient(held) if len(held) > 1 else np.ones(1)

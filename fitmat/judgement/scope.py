@@ -1,0 +1,29 @@
+"""Scope: what the intervals of a fit are about, as plain sentences: which incidences, and how many readings.
+
+It widens nothing; `fitting.correlation` does.
+"""
+
+import numpy as np
+
+from fitmat.fitting.result import Fit
+from fitmat.measurements.incidences import incidence_range
+
+
+def describe_scope(fit: Fit) -> str:
+    """What the intervals are about; empty where there are none."""
+    if not (fit.finite and fit.loss.posterior):
+        return ""
+    data, found, count = fit.data, fit.correlation, fit.n_values
+    low, high = np.rad2deg(incidence_range(np.asarray(data.wi), np.any(np.greater(data.weight, 0.0), axis=1)))
+    over = f"{low:.3g}°" if high - low < 0.05 else f"{low:.3g}–{high:.3g}°"
+    about = f"The intervals of {fit.name} are about the incidences measured ({over}); beyond, they extrapolate."
+    if not found.found:
+        return about
+    return (
+        f"{about} Misfits at neighbouring angles are alike: {count:,} readings count as {_counted(found.independent)} "
+        f"independent ones, and the intervals are up to {np.sqrt(found.inflation.max()):.2g} times wider for that."
+    )
+
+
+def _counted(independent: float) -> str:
+    return f"{independent:,.0f}" if independent >= 10 else f"{independent:.2g}"
