@@ -87,6 +87,7 @@ def write_report(
     draft = interrupts.taken_away(files.new(target, own=page.own, force=force), files.abandon)
     with draft as written, programs.announced(watch.compiling):
         measurements = session.source(sources, reading, watch)
+        page.load_ahead()
         found = study(measurements, resume=files.resumed(target), progress=watch, **told)
         watch("writing the report", 0, 0)
         missing = page.write(written, found)

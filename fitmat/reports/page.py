@@ -4,9 +4,12 @@ Formats numbers that other rooms computed; computes none. The numbers are on dis
 """
 
 import base64
+import contextlib
+import functools
 import io
 import json
 import os
+import threading
 import warnings
 from collections.abc import Callable
 from importlib.metadata import version
@@ -115,7 +118,8 @@ def to_html(study: Study) -> str:
     return _rendered(study, _Pictures())
 
 
-def _rendered(study: Study, pictures: "_Pictures") -> str:
+@functools.cache
+def _environment() -> jinja2.Environment:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("fitmat.reports"),
         autoescape=True,
@@ -123,9 +127,20 @@ def _rendered(study: Study, pictures: "_Pictures") -> str:
         lstrip_blocks=True,
         finalize=_visible,
     )
-    environment.filters |= {"picture": pictures.embedded, "subscripted": _subscripted}
+    environment.filters |= {"picture": _picture, "subscripted": _subscripted}
+    return environment
+
+
+@jinja2.pass_context
+def _picture(context: jinja2.runtime.Context, draw: "Draw", what: str) -> Markup:
+    return context["pictures"].embedded(draw, what)
+
+
+def _rendered(study: Study, pictures: "_Pictures") -> str:
     findings = study.findings
-    return environment.get_template("report.html").render(
+    template = _environment().get_template("report.html")
+    return template.render(
+        pictures=pictures,
         version=version("fitmat"),
         study=study,
         findings=findings,
@@ -230,6 +245,18 @@ def _subscripted(symbol: str) -> Markup:
     """`k_d` as people write it, k with a small d below."""
     letter, _, below = symbol.partition("_")
     return Markup("{}<sub>{}</sub>").format(letter, below) if below else Markup("{}").format(symbol)
+
+
+def load_ahead() -> None:
+    """Load, in a thread, what pages are made with, while there are other things to do."""
+    threading.Thread(target=_load, daemon=True).start()
+
+
+def _load() -> None:
+    with contextlib.suppress(Exception):  # what cannot be loaded is said where it is used
+        _plot()
+        for name in _environment().list_templates():
+            _environment().get_template(name)
 
 
 def _plot() -> Any:
