@@ -217,32 +217,33 @@ def judge(
         progress: Called with what is done next.
     """
     say = progress or (lambda *_: None)
-    say("comparing", 0, 0)
-    match = _match(posteriors, full)
-    usable = [p for p in posteriors if p.fit.finite and p.fit.loss.posterior]
-    choice = None
-    if len(usable) > 1:
-        say("weighing the models", 0, 0)
-        whole = usable[0].fit.n_values == usable[0].fit.measurements.n_valid
-        choice = choose(usable, predicting=whole, singly=full or len(usable) > 2)
-    along = sections(posteriors[0].fit.measurements)
-    looked_at = _detailed(usable, match, choice)
-    findings, count = [], len(posteriors)
-    words = f"examining {', '.join(p.fit.name for p in posteriors) if count <= DETAILED else f'{count} models'}"
-    say(words, 0, count)
-
-    def looked(posterior: Posterior) -> Findings:
-        asked, check = _examined(posterior, seed) if posterior in looked_at else (None, None)
-        return find(posterior, along, asked, check)
-
     with ThreadPoolExecutor(os.cpu_count()) as pool:
+        odd = pool.submit(_odd, posteriors)
+        say("comparing", 0, 0)
+        match = _match(posteriors, full)
+        usable = [p for p in posteriors if p.fit.finite and p.fit.loss.posterior]
+        choice = None
+        if len(usable) > 1:
+            say("weighing the models", 0, 0)
+            whole = usable[0].fit.n_values == usable[0].fit.measurements.n_valid
+            choice = choose(usable, predicting=whole, singly=full or len(usable) > 2)
+        along = sections(posteriors[0].fit.measurements)
+        looked_at = _detailed(usable, match, choice)
+        findings, count = [], len(posteriors)
+        words = f"examining {', '.join(p.fit.name for p in posteriors) if count <= DETAILED else f'{count} models'}"
+        say(words, 0, count)
+
+        def looked(posterior: Posterior) -> Findings:
+            asked, check = _examined(posterior, seed) if posterior in looked_at else (None, None)
+            return find(posterior, along, asked, check)
+
         for found in pool.map(looked, posteriors):
             findings.append(found)
             say(words, len(findings), count)
     if second_opinion:
         asked = [found.posterior in looked_at and found.posterior.chain is not None for found in findings]
         findings = [_asked_again(f, seed, say) if again else f for f, again in zip(findings, asked, strict=True)]
-    return Study(tuple(findings), match, choice, full, _odd(posteriors))
+    return Study(tuple(findings), match, choice, full, odd.result())
 
 
 def _odd(posteriors: Sequence[Posterior]) -> tuple[str, ...]:
