@@ -1,12 +1,12 @@
 """Bulk: the fit of a file too large for memory, by passes over its chunks.
 
-It ends where `fitting.fit` of all rows at once would end, and it keeps no rows but a part of them for the pictures. It
-looks for no other optimum than the one that the part shows.
+It ends where `fitting.fit` of all rows at once would end, and it keeps no rows but a part of them for the pictures and
+some to find its way by. It looks for no other optimum than the one that the part shows.
 """
 
 import dataclasses
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple, TypeVar
 
@@ -22,7 +22,9 @@ from fitmat.fitting.result import Fit, named_outcome
 from fitmat.fitting.streamed_steps import Range
 from fitmat.fitting.streamed_sums import Sums, block_curvature, block_sums, blocks, prior_sums
 from fitmat.measurements.large.noise import Scatter, scatter
-from fitmat.measurements.large.stream import Held, Stream
+from fitmat.measurements.large.stream import Held, Stream, is_kept
+from fitmat.measurements.noise import Noise, measured_noise
+from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector
 from fitmat.text import brief
@@ -31,6 +33,11 @@ T = TypeVar("T")
 
 PASSES = 20
 """At most this many passes over the file; three or four are usual."""
+
+FEW = 150_000
+"""Rows, evenly spread over the file, with which Newton's method finds its way before it passes over all.
+
+What residuals × their curvature add to the information is taken from them: 1 % of a covariance at most."""
 
 SETTLED = 1e-4
 """A Newton step of this many standard errors is the last one."""
@@ -53,11 +60,13 @@ class Rows:
         chunks: The file.
         known: Its noise.
         prepared: Blocks of all rows, where these are in memory; else None, and they are made in each pass.
+        few: `FEW` of the rows, evenly spread, in memory; None of a file that has hardly more.
     """
 
     chunks: Stream
     known: Scatter
     prepared: tuple[Data, ...] | None
+    few: "Rows | None" = None
     __repr__ = brief
 
 
@@ -69,11 +78,31 @@ def rows(chunks: Stream, progress: Progress | None = None) -> Rows:
         progress: Called after each chunk.
     """
     if not isinstance(chunks, Held):
-        return Rows(chunks, scatter(chunks, progress), None)
+        known = scatter(chunks, progress)
+        return Rows(chunks, known, None, _few(chunks, known, ((chunk, known.of(chunk)) for chunk in chunks)))
     seen: list[np.ndarray] = []
     known = scatter(chunks, progress, seen)
-    noises = zip(chunks, (known.at(*pair) for pair in zip(chunks, seen, strict=True)), strict=True)
-    return Rows(chunks, known, tuple(data for chunk, noise in noises for data in blocks(chunk, noise)))
+    pairs = [(chunk, known.at(chunk, level)) for chunk, level in zip(chunks, seen, strict=True)]
+    prepared = tuple(data for chunk, noise in pairs for data in blocks(chunk, noise))
+    return Rows(chunks, known, prepared, _few(chunks, known, pairs))
+
+
+def _few(chunks: Stream, known: Scatter, pairs: Iterable[tuple[Measurements, Noise]]) -> Rows | None:
+    """Some of the rows of chunks with their noise."""
+    thinning = -(-chunks.n_samples // FEW)
+    if thinning == 1:
+        return None
+    some, sigmas, done = [], [], 0
+    for chunk, noise in pairs:
+        kept = np.flatnonzero(is_kept(np.arange(done, done + chunk.n_samples), thinning))
+        some.append(chunk.rows(kept))
+        sigmas.append(noise.sigma[kept])
+        done += chunk.n_samples
+    wi, wo, value, valid = (np.concatenate([getattr(m, name) for m in some]) for name in ("wi", "wo", "value", "valid"))
+    sigma = np.concatenate(sigmas)
+    m = dataclasses.replace(chunks.part, wi=wi, wo=wo, value=value, valid=valid, sigma=sigma)
+    held = Held(m, m.n_samples, m.n_valid, chunks.part, thinning)
+    return Rows(held, known, tuple(blocks(m, measured_noise(m))))
 
 
 def fit_chunks(
@@ -127,8 +156,16 @@ def fit_from(every: Rows, start: Fit, progress: Progress | None = None) -> Fit:
     """The fit of all rows from that of the part."""
     if not start.finite:
         return start
-    file, around = _File(every, start, progress), Range(start)
-    return _concluded(file, around, _climb(file, around))
+    around, file = Range(start), _File(every, start, progress)
+    if every.few is None:
+        top = _climb(file, around, around.begin, around.second_order)
+        return _concluded(file, around, top, _second_order(file, around, top))
+    few = _File(every.few, start, progress)
+    near = _climb(few, around, around.begin, around.second_order)
+    more, around = _second_order(few, around, near), Range(start)
+    begin = near.x if near.x[-1] > 0.0 else np.append(near.x[:-1], start.discrepancy)
+    top = _climb(file, around, begin, lambda *_: more)
+    return _concluded(file, around, top, more)
 
 
 class _File(NamedTuple):
@@ -175,12 +212,18 @@ class _Top(NamedTuple):
     settled: bool
 
 
-def _climb(file: _File, around: Range) -> _Top:
-    """Newton's method with damping after steps that made things worse (Levenberg 1944)."""
-    x, damping = around.begin, 0.0
+def _climb(file: _File, around: Range, x: np.ndarray, second_order: Callable[..., np.ndarray]) -> _Top:
+    """Newton's method with damping after steps that made things worse (Levenberg 1944).
+
+    Args:
+        file: The rows.
+        around: Where x may go.
+        x: Where to begin.
+        second_order: What residuals × their curvature add to JᵀJ for each value, of a model and s.
+    """
+    damping, n_valid = 0.0, file.rows.chunks.n_valid
     kept = file.sums(around.model(x), x[-1], "pass 1")
-    n_valid = file.rows.chunks.n_valid
-    more = around.second_order(around.model(x), x[-1], n_valid)
+    more = n_valid * second_order(around.model(x), x[-1])
     for k in range(2, PASSES + 1):
         step, length = around.step(x, kept, more, damping)
         tried = x + step
@@ -194,17 +237,25 @@ def _climb(file: _File, around: Range) -> _Top:
         damping = (damping / 3.0 if damping > DAMPING else 0.0) if better else max(10.0 * damping, DAMPING)
         if better:
             x, kept = tried, sums
-            more = around.second_order(around.model(x), x[-1], n_valid)
+            more = n_valid * second_order(around.model(x), x[-1])
     return _Top(x, kept, PASSES, False)
 
 
-def _concluded(file: _File, around: Range, top: _Top) -> Fit:
+def _second_order(file: _File, around: Range, top: _Top) -> np.ndarray:
+    """What residuals × their curvature add to JᵀJ for each value at the top of `file`; 0 if negligible."""
+    best, s = around.model(top.x), float(top.x[-1])
+    if s < FOLLOWS * float(file.start.data.typical):
+        return np.zeros_like(top.sums.gram)
+    observed = file.added(lambda data: block_curvature(best, data, s), "curvature")
+    return (observed + prior_sums(best, file.start.data, s).gram - top.sums.gram) / file.rows.chunks.n_valid
+
+
+def _concluded(file: _File, around: Range, top: _Top, more: np.ndarray) -> Fit:
     """The fit of the part with the numbers of all rows."""
     start, best, s = file.start, around.model(top.x), float(top.x[-1])
     information, free = np.asarray(top.sums.gram), start.free
     if s >= FOLLOWS * float(start.data.typical):
-        observed = file.added(lambda data: block_curvature(best, data, s), "curvature")
-        observed = observed + prior_sums(best, start.data, s).gram
+        observed = information + file.rows.chunks.n_valid * more
         information = observed if is_positive(observed[np.ix_(free, free)]) else information
     spread, undetermined = covariance(best, information, start.coordinates, start.data.told(free))
     on_bound = bool(start.coordinates.side(np.asarray(vector(best))).any())

@@ -48,14 +48,14 @@ class Range:
         values[self._free] = np.clip(values[self._free], self._moved.lower, self._moved.upper)
         return with_vector(self._start.model, values)
 
-    def second_order(self, best: AbstractBRDF, s: float, n_valid: int) -> Float[np.ndarray, "p p"]:
-        """What residuals × their curvature add to JᵀJ of so many values, estimated from the part; 0 if negligible."""
+    def second_order(self, best: AbstractBRDF, s: float) -> Float[np.ndarray, "p p"]:
+        """What residuals × their curvature add to JᵀJ for each value, estimated from the part; 0 if negligible."""
         start = self._start
         if s < FOLLOWS * float(start.data.typical):
             return np.zeros_like(start.information)
         first = expected_information(best, start.data, s)
         both = observed_information(best, start.data, s, first)
-        return (both - first) * n_valid / start.measurements.n_valid
+        return (both - first) / start.measurements.n_valid
 
     def step(self, x: np.ndarray, sums: Sums, more: np.ndarray, damping: float) -> tuple[np.ndarray, float]:
         """The projected Newton step from x, and its length in standard errors."""

@@ -36,6 +36,9 @@ SAME_COVARIANCE = 1e-5
 PART_OF_THE_ROWS = 0.25
 """Relative, of variances: other rows stand for all where the correlation of the misfit is asked."""
 
+BENT = 0.02
+"""Relative, of a covariance whose second-order part comes from 12,000 of 48,000 rows."""
+
 SAME_LIKELIHOOD = 1e-6
 """Absolute, of some 10⁵ to 10⁶: rounding of a sum in another order."""
 
@@ -117,6 +120,16 @@ def test_a_large_text_is_fitted_as_in_one_piece(found: Fit, whole: Fit) -> None:
     assert "over the 48,000 rows; all are fitted." in found.measurements.notes[-1]
 
 
+def test_some_of_the_rows_show_the_way(scanned: Chunks, whole: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All rows end where they did without; how far residuals bend comes from the few."""
+    monkeypatch.setattr(streamed, "FEW", 12_000)
+    found = streamed.fit_chunks(scanned, MODEL)
+    assert np.abs(deviations(found, whole)).max() < SAME
+    assert found.discrepancy == pytest.approx(whole.discrepancy, rel=SAME_COVARIANCE)
+    assert found.log_likelihood == pytest.approx(whole.log_likelihood, rel=0, abs=SAME_LIKELIHOOD)
+    np.testing.assert_allclose(found.likelihood_covariance, whole.likelihood_covariance, rtol=BENT)
+
+
 @pytest.mark.study
 def test_a_large_parquet_file_is_fitted_as_in_one_piece(whole: Fit, tmp_path: Path) -> None:
     path = saved(whole.measurements, tmp_path / "gloss.parquet")
@@ -129,10 +142,12 @@ def test_a_far_start_ends_in_the_same_place(scanned: Chunks, found: Fit, monkeyp
     costs: list[float] = []
     climb, sums = streamed._climb, streamed._File.sums
 
-    def elsewhere(file: Any, around: Any) -> Any:
+    def elsewhere(file: Any, *_: Any) -> Any:
         far = with_vector(file.start.model, np.array([0.2, 0.1, 30.0]))
         expected = information.expected_information(far, file.start.data, 0.01)
-        return climb(file, Range(dataclasses.replace(file.start, model=far, discrepancy=0.01, information=expected)))
+        away = Range(dataclasses.replace(file.start, model=far, discrepancy=0.01, information=expected))
+        # Nothing of what bends: steps are too long, so that some are taken back.
+        return climb(file, away, away.begin, lambda *_: np.zeros_like(expected))
 
     def noted(*args: Any) -> Sums:
         result = sums(*args)
@@ -141,7 +156,6 @@ def test_a_far_start_ends_in_the_same_place(scanned: Chunks, found: Fit, monkeyp
 
     monkeypatch.setattr(streamed, "PASSES", 40)
     monkeypatch.setattr(streamed, "_climb", elsewhere)
-    monkeypatch.setattr(Range, "second_order", lambda *_: 0.0)  # steps too long, so that some are taken back
     monkeypatch.setattr(streamed._File, "sums", noted)
     far = streamed.fit_chunks(scanned, MODEL)
     assert len(costs) > 5
@@ -208,7 +222,8 @@ def test_too_few_passes_are_named(coloured: Chunks, monkeypatch: pytest.MonkeyPa
 
 def _climber(scanned: Chunks) -> Any:
     start = fm.fit(scanned.part, "lambert")
-    return streamed._File(streamed.rows(scanned), start, None), Range(start)
+    around = Range(start)
+    return streamed._File(streamed.rows(scanned), start, None), around, around.begin, around.second_order
 
 
 @pytest.mark.study

@@ -270,7 +270,7 @@ def test_a_picture_that_fails_is_a_sentence(studied, tmp_path, monkeypatch, blan
     [
         ("page._plot", r"report\.html lacks what could not be drawn: Measured .*, Corner plot of \S+ \(ValueError", 4),
         (
-            "page.jinja2.Environment",
+            "page._environment",
             r"report\.html could not be made \(ValueError: no glyph\); .* saved in fit\.json",
             3,
         ),
