@@ -27,6 +27,9 @@ STANDS_OUT = 1.5
 FALLS = 0.75
 """Beside a peak, on both sides, a curve falls below this fraction of it; what grows towards grazing does not."""
 
+SEVERAL = 2
+"""Curves that peak elsewhere by so many incidences do not do so by chance."""
+
 BESIDE, TOP = np.deg2rad(45.0), np.deg2rad(8.0)
 """Angle within which it falls so far, and within which nothing is higher."""
 
@@ -53,13 +56,28 @@ def with_peak_side(m: Measurements, unsaid_side: Sequence[str]) -> Measurements:
         )
         return dataclasses.replace(m, warnings=(*m.warnings, warning))
     if not back:
-        return m
+        return _with_origin(m)
     warning = (
         f"The values peak back towards the light, not in the mirror direction (at {_listed(back)} incidence). Either "
         f"the file counts its angles from the other side: pass {exchange}; or the sample is a retro-reflector: confirm "
         f"it with {confirm}."
     )
     return dataclasses.replace(m, warnings=(*m.warnings, warning))
+
+
+def _with_origin(m: Measurements) -> Measurements:
+    """With a warning where every judged curve peaks at the normal, or twice as far from it as the mirror direction."""
+    for where, origin, mended in (
+        (lambda theta_i: 0.0, "the mirror direction", "theta_o + theta_i"),
+        (lambda theta_i: 2.0 * theta_i, "the direction of the light", "theta_o − theta_i"),
+    ):
+        if len(found := _peaking(m, where)) >= SEVERAL:
+            warning = (
+                f"The values peak at {'twice the mirror angle' if where(1.0) else 'the normal'} (at {_listed(found)} "
+                f"incidence): theta_o looks counted from {origin}. If it is, write {mended} in its place."
+            )
+            return dataclasses.replace(m, warnings=(*m.warnings, warning))
+    return m
 
 
 def towards_light(m: Measurements) -> tuple[float, ...]:
@@ -89,9 +107,10 @@ def _peaking(m: Measurements, where: Callable[[float], float]) -> tuple[float, .
         if abs(where(at) - at) < 2 * NEAR and where(at) > 0:
             continue
         angle, value = _curve(signed[lit.rows], m.value[lit.rows, channel])
-        if _peaks(angle, value, at):
+        if _peaks(angle, value, at, min(NEAR, 0.75 * at)):
             return ()
-        if _peaks(angle, value, where(at)):
+        apart = 0.5 * abs(where(at) - at)
+        if _peaks(angle, value, where(at), min(NEAR, apart, 0.75 * abs(where(at)) or apart)):
             back.append(lit.theta_i_deg)
     return tuple(back)
 
@@ -106,9 +125,9 @@ def _curve(angle: np.ndarray, value: np.ndarray) -> tuple[Float[np.ndarray, " k"
     return angles, np.bincount(group, value) / np.bincount(group)
 
 
-def _peaks(angle: np.ndarray, value: np.ndarray, at: float) -> bool:
-    """Whether the curve has a peak near an angle."""
-    near = np.flatnonzero(np.abs(angle - at) < min(NEAR, 0.75 * abs(at)))
+def _peaks(angle: np.ndarray, value: np.ndarray, at: float, within: float) -> bool:
+    """Whether the curve has a peak so near to an angle."""
+    near = np.flatnonzero(np.abs(angle - at) < within)
     if len(near) == 0 or len(value) < 5:
         return False
     top = near[value[near].argmax()]

@@ -3,6 +3,8 @@
 It converts nothing: logarithms and percent are doubted, never assumed.
 """
 
+import dataclasses
+
 import numpy as np
 
 from fitmat.errors import ReadError
@@ -23,6 +25,9 @@ AWAY, BACK, UPRIGHT = np.deg2rad(30.0), np.deg2rad(15.0), np.deg2rad(75.0)
 BRIGHTEST = 2.0
 """A reflectance factor that no surface has there: it would reflect twice what falls on it."""
 
+LOUD = 2.0
+"""Times its value that a σ is, in the middle one, where the file does not hold noise alone, or σ in percent."""
+
 COMPARED = ("reflectance_factor", "panel_ratio")
 """Quantities that are 1 for a perfect white surface."""
 
@@ -40,6 +45,20 @@ def refuse_implausible(m: Measurements, quantity: str, options: Options) -> None
         _refuse_logarithms(value[valid], where)
         if quantity in COMPARED and not options.unknown_scale:
             _refuse_percent(np.pi * value[valid & _diffuse(m)], where)
+
+
+def with_doubts(m: Measurements) -> Measurements:
+    """The measurements, with a warning where σ can hardly be that of the values."""
+    if m.sigma is None or not m.valid.any():
+        return m
+    typical = float(np.median(m.sigma[m.valid] / np.maximum(np.abs(m.value[m.valid]), np.finfo(float).tiny)))
+    if typical <= LOUD:
+        return m
+    warning = (
+        f"sigma is {typical:.3g} times its value in the middle one of the rows: is it in percent? It is read as the "
+        "standard deviation in the unit of the value."
+    )
+    return dataclasses.replace(m, warnings=(*m.warnings, warning))
 
 
 def _refuse_logarithms(value: np.ndarray, where: str) -> None:

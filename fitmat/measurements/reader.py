@@ -36,7 +36,7 @@ from fitmat.measurements.parsing import cells, contents, frames, tabular
 from fitmat.measurements.parsing.recording import Recording, mask
 from fitmat.measurements.parsing.table import Table, from_arrays
 from fitmat.measurements.peak_side import with_peak_side
-from fitmat.measurements.plausible_values import refuse_implausible
+from fitmat.measurements.plausible_values import refuse_implausible, with_doubts
 from fitmat.measurements.quantity import factor, note
 from fitmat.measurements.samples import Measurements
 from fitmat.measurements.scale import of_unknown_scale
@@ -160,7 +160,7 @@ def _part(
         found = measured(recording, options)
         _refuse_all_masked(found)
         refuse_implausible(found, recording.quantity, options)
-        found = with_peak_side(found, recording.unsaid_side)
+        found = with_doubts(with_peak_side(found, recording.unsaid_side))
     except ReadError as error:
         if name is None or not str(error).startswith(own := contents.name(name)):
             raise
@@ -205,6 +205,7 @@ def measured(recording: Recording, options: Options) -> Measurements:
         masked=masked,
         notes=(note(recording.quantity, options), *recording.notes),
         stated=recording.stated,
+        warnings=recording.warnings,
     )
     return without_blocked(found)
 

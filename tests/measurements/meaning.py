@@ -211,6 +211,35 @@ def quoted(t: Table, rng: np.random.Generator) -> None:
     t.written = {f'"{key}"': [f'"{cell}"' for cell in cells] for key, cells in t.written.items()}
 
 
+def two_samples(t: Table, rng: np.random.Generator) -> None:
+    """In one file, the second at most two thirds as bright: no repeats of one."""
+    cells = [f"{float(cell) * rng.uniform(0.2, 0.65):.5g}" for cell in t.written[t.quantity]]
+    t.written = {key: [*part, *(cells if key == t.quantity else part)] for key, part in t.written.items()}
+    t.written["sample"] = ["A"] * len(cells) + ["B"] * len(cells)
+
+
+def angle_from_the_mirror(t: Table, rng: np.random.Generator) -> None:
+    """Nobody can tell it where the peak lies at the end of the scan."""
+    if "phi" in t.angles or np.count_nonzero(np.unique(t.angles["theta_i"]) <= 50.0) < 2:
+        two_samples(t, rng)
+    else:
+        _angle(t, "theta_o", t.angles["theta_o"] - t.angles["theta_i"])
+
+
+def arm_from_the_horizon(t: Table, rng: np.random.Generator) -> None:
+    """90° is the normal, and 180° the other horizon."""
+    if "phi" in t.angles:
+        two_samples(t, rng)
+    else:
+        _angle(t, "theta_o", 90.0 + t.angles["theta_o"])
+
+
+def wavelength_in_micrometres(t: Table, rng: np.random.Generator) -> None:
+    """With the unit, or without it."""
+    name = str(rng.choice(["wavelength", "wavelength [µm]", "lambda"]))
+    t.written[name] = [f"{rng.uniform(0.35, 2.5):.3f}"] * len(t.value)
+
+
 KINDS: tuple[Callable[[Table, np.random.Generator], None], ...] = (
     *(azimuth_in_radians, everything_in_radians, radians_in_the_header, a_whole_turn, elevation_by_name),
     *(elevation_of_the_sensor, light_on_the_negative_side, mirrored_azimuth, satellite_names, decibels, logarithms),
@@ -225,6 +254,7 @@ KINDS: tuple[Callable[[Table, np.random.Generator], None], ...] = (
         units_below,
         quoted,
     ),
+    *(two_samples, angle_from_the_mirror, arm_from_the_horizon, wavelength_in_micrometres),
 )
 
 

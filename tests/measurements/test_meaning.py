@@ -19,7 +19,7 @@ def test_changes_of_meaning_are_not_read_in_silence() -> None:
 def test_two_thousand_changes_of_meaning_are_not_read_in_silence() -> None:
     counts = meaning.tried(2000, seed=0)
     assert misread(counts) == {}
-    assert sum(found["right"] for found in counts.values()) > 800  # of twenty kinds half can be read without a flag
+    assert sum(found["right"] for found in counts.values()) > 800  # of two dozen kinds half can be read without a flag
 
 
 def test_a_table_that_is_misread_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -68,6 +68,21 @@ def test_a_scan_of_the_light_side_alone_is_said():
     assert len(fm.read({name: column[kept] for name, column in flat.items()}).warnings) == 1
 
 
+@pytest.mark.parametrize(
+    ("at", "origin", "mended"),
+    [(0.0, "peak at the normal", "theta_o + theta_i"), (2.0, "peak at twice the mirror angle", "theta_o − theta_i")],
+)
+def test_an_angle_that_counts_from_elsewhere_is_said(at: float, origin: str, mended: str):
+    """From the mirror direction, where every curve peaks at 0; from the light, where it peaks at twice its angle."""
+    theta_i, theta_o = (part.ravel() for part in np.meshgrid([31.0, 36.0, 40.0], SENSOR, indexing="ij"))
+    flat = {"theta_i": theta_i, "theta_o": theta_o, "brdf": gaussian(theta_i, theta_o, at)}
+    (warning,) = fm.read(flat).warnings
+    assert origin in warning
+    assert f"write {mended} in its place" in warning
+    assert fm.read(flat, forward="positive").warnings == ()
+    assert fm.read(flat | {"brdf": gaussian(theta_i, theta_o, 1.0)}).warnings == ()
+
+
 def test_a_retro_reflector_is_confirmed():
     assert fm.read(with_azimuth(table(mirrored), 180.0), specular_azimuth=180).warnings == ()
     assert fm.read(table(mirrored), forward="positive").warnings == ()

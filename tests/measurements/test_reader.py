@@ -236,6 +236,18 @@ def test_an_angle_stated_in_a_comment(write, comment):
     assert "theta_i = 30 in every row, by the comment in row 2." in measured.notes
 
 
+@pytest.mark.parametrize(
+    "note",
+    ["Incident angle: 30", "theta_i = 30°", "AOI;30;;", "Angle of incidence,30", "theta_i\t30 deg", "[Set]\nAOI=30"],
+)
+def test_an_angle_stated_in_a_note_above_the_header(write, note):
+    path = write(f"Sample: plate 7\n{note}\ntheta_o,phi,brdf\n45,100,1\n50,100,2\n")
+    measured = read(path)
+    assert degrees(measured) == [[30, 45, 100], [30, 50, 100]]
+    line = 2 + note.count("\n")
+    assert f"theta_i = 30 in every row, by the comment in row {line}." in measured.notes
+
+
 def test_a_comment_serves_only_what_has_no_column(write):
     path = write("# theta_i = 10\n# phi_i = 20\n# phi = 5\ntheta_i,theta_o,phi,brdf\n30,45,100,1\n")
     assert degrees(read(path)) == [[30, 45, 100]]

@@ -25,7 +25,7 @@ from fitmat.measurements.parsing.columns import Columns
 from fitmat.measurements.parsing.recording import Recording, named
 from fitmat.measurements.parsing.table import Table
 from fitmat.measurements.peak_side import with_peak_side
-from fitmat.measurements.plausible_values import refuse_implausible
+from fitmat.measurements.plausible_values import refuse_implausible, with_doubts
 from fitmat.measurements.reader import FORMATS, measured
 from fitmat.measurements.samples import Measurements
 from fitmat.measurements.scale import of_unknown_scale
@@ -69,7 +69,9 @@ class Chunks:
 
     def __iter__(self) -> Iterator[Measurements]:
         for table in _chosen(self.path, self.rows, self.where):
-            found = _converted(tabular.recording(table, self.columns, self.options), self.options, self.sentinel)
+            found = _converted(
+                tabular.recording(table, self.columns, self.options, doubted=False), self.options, self.sentinel
+            )
             yield found if self.factor == 1.0 else _divided(found, self.factor)
 
     def in_part(self, first: int, count: int) -> Bool[np.ndarray, " count"]:
@@ -121,18 +123,18 @@ def scan(
         stated = as_stated(whole_table, layout.angles, whole)
         lenient = stated.with_units({name: stated.unit(name) or "degrees" for name in layout.angles})
         angles = {name: column for name, column in layout.angles.items() if column < len(table.names)}
-        look.add(tabular.recorded(whole_table, layout, lenient), table, angles)
+        look.add(tabular.recorded(whole_table, layout, lenient, doubted=not look.n_samples), table, angles)
         if progress is not None:
             progress("reading", look.n_samples, 0)
     if look.extremes is not None:
-        tabular.recording(look.extremes, columns, whole)
+        tabular.recording(look.extremes, columns, whole, doubted=False)
     if not look.n_valid:
         listed = ", ".join(f"{count} {reason}" for reason, count in look.masked.items()) or "none chosen"
         expected = "expected at least one value that can be used. Check the columns and units"
         raise ReadError(f"{contents.name(path)}: every row is masked ({listed}), {expected}.")
     raw = dataclasses.replace(_part(look, lenient), instrument=instrument)
     refuse_implausible(raw, look.kept[0].quantity, options)
-    raw = with_peak_side(raw, look.kept[0].unsaid_side)
+    raw = with_doubts(with_peak_side(raw, look.kept[0].unsaid_side))
     shown = of_unknown_scale(raw) if options.unknown_scale else raw
     top = int(np.argmax(raw.value))
     return Chunks(

@@ -91,8 +91,12 @@ def _laid_out(lines: pl.DataFrame) -> tuple[pl.DataFrame, pl.DataFrame, str | No
     rows = lines.filter(~comment)
     if not above:
         return rows, lines.filter(comment), delimiter, ()
-    told = contents.listed(" ".join(line.split()) for line in rows["text"].head(above))
-    return rows.slice(above), lines.filter(comment), delimiter, (f"Read as notes, above the header: {told}.",)
+    notes = rows.head(above)
+    told = contents.listed(" ".join(line.split()) for line in notes["text"])
+    # A note states a number as a comment does, in one cell or in two: "Incident angle: 30", "theta_i;30;;".
+    plain = notes["text"].str.strip_chars(" \t,;").str.replace(r"^([^=:,;\t]+)[,;\t]", "${1}=")
+    comments = pl.concat([lines.filter(comment), notes.with_columns(text="# " + plain)])
+    return rows.slice(above), comments, delimiter, (f"Read as notes, above the header: {told}.",)
 
 
 def _delimiter(lines: list[str]) -> str | None:

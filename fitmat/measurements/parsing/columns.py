@@ -31,7 +31,7 @@ class Columns:
         reference_sigmas: Channel → column of that reading's σ.
         marks: valid, invalid, wavelength, channel, where given.
         quantity: One of `QUANTITIES`, or "signal", which becomes "panel_ratio" by its reference.
-        unused: Names of the columns that play no part.
+        unused: The columns that play no part.
     """
 
     angles: dict[str, int]
@@ -41,7 +41,7 @@ class Columns:
     reference_sigmas: dict[str, int]
     marks: dict[str, int]
     quantity: str
-    unused: tuple[str, ...]
+    unused: tuple[int, ...]
 
 
 def assign(table: Table, columns: str | Mapping[str, str | int] | None, quantity: str | None) -> Columns:
@@ -64,7 +64,7 @@ def assign(table: Table, columns: str | Mapping[str, str | int] | None, quantity
     sigmas, references, spreads = (_beside(table, kind, found, values) for kind in BESIDE)
     _refuse_unreferenced(table, quantity, references)
     used = {c for group in (angles, values, sigmas, references, spreads, marks) for c in group.values()}
-    unused = tuple(table.label(c) for c in range(len(table.names)) if c not in used)
+    unused = tuple(c for c in range(len(table.names)) if c not in used)
     return Columns(angles, values, sigmas, references, spreads, marks, quantity, unused)
 
 
@@ -154,7 +154,9 @@ def _refuse_angles(table: Table, angles: Mapping[str, int]) -> None:
     missing = [name for name, other in ELEVATIONS.items() if not {name, other} & angles.keys()]
     if missing:
         expected = " and ".join(f"{name} (or {', '.join(ALIASES[name][:4])}, …)" for name in missing)
-        raise ReadError(f"{table.source}: {_found(table)}, expected {expected}. Name them: {EXAMPLE}.")
+        flag = missing[0].replace("_", "-")
+        same = f"or, of one that is the same in every row, say it: --{flag} 30 (constants=)"
+        raise ReadError(f"{table.source}: {_found(table)}, expected {expected}. Name them: {EXAMPLE}; {same}.")
     azimuths = angles.keys() & {"phi", "phi_i", "phi_o"}
     if "phi" in azimuths and len(azimuths) > 1:
         found = " and ".join(sorted(azimuths))

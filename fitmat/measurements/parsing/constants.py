@@ -19,7 +19,7 @@ CONSTANTS = (*ANGLES, "wavelength")
 """What can be said to be the same in every row."""
 
 SHORTEST = 100.0
-"""Number from which a comment that calls it a wavelength means nm."""
+"""Number from which a wavelength is one in nm; smaller ones are in µm, or in another unit."""
 
 
 def with_constants(

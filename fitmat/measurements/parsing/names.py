@@ -15,10 +15,12 @@ from fitmat.measurements.quantity import QUANTITIES
 ALIASES = {
     "theta_i": (
         *("theta_in", "aoi", "incidence_angle", "sza", "incident_angle", "angle_of_incidence", "theta_inc", "theta_s"),
+        *("incidence", "lamp_angle", "source_angle", "einfallswinkel"),
         *("in_theta", "zenith_i", "solar_zenith", "sun_zenith", "source_zenith", "illumination_zenith"),
     ),
     "theta_o": (
         *("theta_out", "theta_r", "detector_angle", "vza", "measure_angle", "measurement_angle", "scatter_angle"),
+        *("emission", "camera_angle", "sensor_angle", "ausfallswinkel", "beobachtungswinkel"),
         *("reflection_angle", "viewing_angle", "view_angle", "theta_v", "out_theta", "zenith_o", "zenith_r"),
         *("view_zenith", "viewing_zenith", "sensor_zenith", "detector_zenith"),
     ),
@@ -35,9 +37,9 @@ ALIASES = {
     "signal": ("reading", "counts"),
     "reference": ("reference_signal", "white", "panel"),
     "value": (),
-    "sigma": ("std", "brdf_sigma", "brdf_std"),
+    "sigma": ("std", "stdev", "std_dev", "standard_deviation", "brdf_sigma", "brdf_std"),
     "sigma_reference": (),
-    "wavelength": ("wavelength_nm", "lambda", "lambda_nm"),
+    "wavelength": ("wavelength_nm", "lambda", "lambda_nm", "wl", "nm"),
     "channel": ("band",),
     "valid": (),
     "invalid": ("flag",),

@@ -49,6 +49,7 @@ class Recording:
         unsaid_side: The flag that exchanges the mirror side and the light's, and the one that confirms them; empty
             where format or user has settled which is which.
         stated: What the file says that its values add up to.
+        warnings: Plain sentences: what may have been meant otherwise than it is read.
     """
 
     source: str
@@ -63,6 +64,7 @@ class Recording:
     distinct: bool = False
     unsaid_side: tuple[str, ...] = ()
     stated: tuple[StatedAlbedo, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     __repr__ = brief
 

@@ -17,7 +17,7 @@ from fitmat.text import brief
 ERROR_VALUES = ("#n/a", "#div/0!", "#ref!", "#value!", "#name?", "#num!", "#null!")
 """What spreadsheets write into a cell that they cannot compute, in lower case."""
 
-MISSING = ("", "nan", "na", "n/a", "<na>", "null", "none", "-", *ERROR_VALUES)
+MISSING = ("", "nan", "na", "n/a", "n.a.", "<na>", "null", "none", "-", "--", "---", *ERROR_VALUES)
 """Cells that hold no number and say so, in lower case."""
 
 _TRUTH = {"true": "1", "t": "1", "yes": "1", "y": "1", "false": "0", "f": "0", "no": "0", "n": "0"}

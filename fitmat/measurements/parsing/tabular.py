@@ -3,36 +3,42 @@
 It opens no file and masks nothing.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from fitmat.errors import ReadError
 from fitmat.maths.directions import from_angles
 from fitmat.measurements.options import Options
-from fitmat.measurements.parsing import contents, scales, units
-from fitmat.measurements.parsing.angles import directions, unsaid_side
+from fitmat.measurements.parsing import contents, scales, units, unused
+from fitmat.measurements.parsing.angles import ROUNDING, directions, unsaid_side
 from fitmat.measurements.parsing.columns import Columns, assign
-from fitmat.measurements.parsing.constants import with_constants
+from fitmat.measurements.parsing.constants import SHORTEST, with_constants
 from fitmat.measurements.parsing.recording import Recording, pivot, sentinels
 from fitmat.measurements.parsing.table import Table
 from fitmat.measurements.samples import default_channels
 
+HIDDEN = 0.3
+"""Share of the rows beyond 90° from the normal from which the angle may be another one."""
 
-def recording(table: Table, columns: str | Mapping[str, str | int] | None, options: Options) -> Recording:
+
+def recording(
+    table: Table, columns: str | Mapping[str, str | int] | None, options: Options, *, doubted: bool = True
+) -> Recording:
     """One row for each geometry and repeat.
 
     Args:
         table: Named columns.
         columns: Our name → theirs, where the header has other names.
         options: What the table does not say about itself.
+        doubted: Whether to look for what may have been meant otherwise, which takes its time in every part of a file.
 
     Raises:
         ReadError: a column is missing or doubtful, or a cell is not what it should be.
     """
     if options.where is not None:
         table = table.chosen(options.where)
-    return recorded(*laid_out(table, columns, options), options)
+    return recorded(*laid_out(table, columns, options), options, doubted=doubted)
 
 
 def laid_out(table: Table, columns: str | Mapping[str, str | int] | None, options: Options) -> tuple[Table, Columns]:
@@ -41,8 +47,8 @@ def laid_out(table: Table, columns: str | Mapping[str, str | int] | None, option
     return whole, assign(whole, columns, options.quantity)
 
 
-def recorded(table: Table, layout: Columns, options: Options) -> Recording:
-    """The recording of a table whose columns are known, from `laid_out`; errors as `recording`."""
+def recorded(table: Table, layout: Columns, options: Options, *, doubted: bool) -> Recording:
+    """The recording of a table whose columns are known, from `laid_out`; arguments and errors as `recording`."""
     angles, assumed = directions(table, layout.angles, options)
     theta_i, phi_i, theta_o, phi_o = angles.T
     scale = _scale(table, layout, options)
@@ -55,21 +61,44 @@ def recorded(table: Table, layout: Columns, options: Options) -> Recording:
         reference, spread = scales.plain(_stacked(table, layout.references), spread, scale)
         doubts |= {"reference reading not positive": ~(reference > 0)}
         value, sigma = _ratio((value, sigma), (np.where(reference > 0, reference, np.nan), spread))
-    unused = (f"Columns not used: {contents.listed(layout.unused)}.",) if layout.unused else ()
+    left = (f"Columns not used: {contents.listed(map(table.label, layout.unused))}.",) if layout.unused else ()
+    wi, wo = from_angles(theta_i, phi_i), from_angles(theta_o, phi_o)
+    labels = _labels(table, layout.marks)
     found = Recording(
         source=table.source,
-        wi=from_angles(theta_i, phi_i),
-        wo=from_angles(theta_o, phi_o),
+        wi=wi,
+        wo=wo,
         value=value,
         quantity="panel_ratio" if layout.quantity == "signal" else layout.quantity,
         channels=tuple(layout.values) if any(layout.values) else default_channels(1),
         sigma=sigma,
         doubts=doubts,
-        notes=(*table.notes, *scales.note(scale), *assumed, *unused),
+        notes=(*table.notes, *scales.note(scale), *assumed, *left),
         unsaid_side=unsaid_side(layout.angles, options),
+        warnings=tuple(_doubts(table, layout, (wi, wo), labels, value, sigma)) if doubted else (),
     )
-    labels = _labels(table, layout.marks)
     return found if labels is None else pivot(found, labels)
+
+
+def _doubts(
+    table: Table,
+    layout: Columns,
+    pair: tuple[np.ndarray, np.ndarray],
+    labels: np.ndarray | None,
+    value: np.ndarray,
+    sigma: np.ndarray | None,
+) -> Iterator[str]:
+    """What may have been meant otherwise: zenith angles that lie beyond 90°, and columns that play no part."""
+    for name, w in zip(("theta_i", "theta_o"), pair, strict=True):
+        beyond = int(np.count_nonzero(w[:, 2] < -ROUNDING))
+        if beyond > HIDDEN * len(w):
+            yield (
+                f"{name} is beyond 90° in {beyond} of {len(w)} rows, which are not used: is it the angle of an arm "
+                "that counts from elsewhere than the normal? Count it from the normal, in the file."
+            )
+    channel = [] if labels is None else [np.unique(labels, return_inverse=True)[1].reshape(-1, 1)]
+    told, readings = np.hstack([*pair, *channel]), layout.quantity == "signal"
+    yield from unused.doubts(table, layout.unused, told, value, noisy=sigma is not None, readings=readings)
 
 
 def _scale(table: Table, layout: Columns, options: Options) -> str | None:
@@ -148,6 +177,8 @@ def _labels(table: Table, marks: Mapping[str, int]) -> np.ndarray | None:
         if units.split(table.names[marks["wavelength"]])[1] == "µm":
             labels = np.round(1000 * labels, 6)
         wrong, expected = ~(np.isfinite(labels) & (labels > 0)), "a wavelength in nm"
+        if (small := (labels > 0) & (labels < SHORTEST)).all():
+            wrong, expected = small, f"{SHORTEST:g} nm and more; if it is in µm, name the column wavelength [µm]"
     elif "channel" in marks:
         labels = table.words(marks["channel"])
         wrong, expected = labels == "", "the name of a channel"
