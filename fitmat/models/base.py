@@ -53,6 +53,14 @@ class AbstractBRDF(eqx.Module):
     def isotropic(self) -> bool:
         """Whether only the difference of the two azimuths counts."""
 
+    def mirror(self, wi: Vec3) -> Spectrum:
+        """Fraction of the light from ω_i that leaves in the mirror direction alone, where no value of f holds it: 0.
+
+        Only a polished coat has one.
+        """
+        del wi
+        return jnp.zeros(())
+
     @abstractmethod
     def diffuse_albedo(self) -> Spectrum:
         """Albedo of what leaves in all directions alike, in [0, 1]; what a coat above sends back and forth."""
@@ -137,6 +145,10 @@ class Sum(AbstractBRDF):
     def isotropic(self) -> bool:
         """Where all lobes are."""
         return all(lobe.isotropic for lobe in self.lobes)
+
+    def mirror(self, wi: Vec3) -> Spectrum:
+        """The sum over the lobes."""
+        return sum((lobe.mirror(wi) for lobe in self.lobes[1:]), self.lobes[0].mirror(wi))
 
     def diffuse_albedo(self) -> Spectrum:
         """The sum over the lobes, at most 1."""

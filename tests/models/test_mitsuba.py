@@ -63,8 +63,8 @@ SUMS = 5e-6
 RULE = 5e-4
 """Relative; what Mitsuba's 32 by 32 Gauss rule is off in T, the integrand having a kink along the disk's diagonals."""
 
-INTEGRAL = 1e-4
-"""Relative; `RoughCoat.crossing` from outside, 32 by 16 nodes, where T > 0.1."""
+ENTERING = 1e-3
+"""Absolute; the albedo of the face by 12 by 12 visible normals at 24 cosines, eta 1.5."""
 
 MEASURED = 0.1
 """Relative; how far a stated difference may be from the one found."""
@@ -75,13 +75,14 @@ METALS = {"Au": 0.084, "Ag": 0.07, "Cu": 0.051, "Al": 0.011, "Cr": 0.21, "Mo": 0
 Of the index alone: with Mitsuba's own spectra put into fitmat the values agree to single precision.
 """
 
-PLASTIC = {0.03: 0.010, 0.1: 0.030, 0.3: 0.13, 1.0: 0.40}
-"""alpha → worst relative difference of the whole BRDF of rough plastic, eta 1.5, kd 0.5, by definition.
+PLASTIC = {0.03: 0.028, 0.1: 0.16, 0.3: 0.44, 1.0: 3.2}
+"""alpha → worst relative difference of the whole BRDF of rough plastic up to 78°, eta 1.5, kd 0.5, by definition.
 
-Mitsuba returns to the body only what the face's underside reflects in one scattering; fitmat all that does not cross.
+Mitsuba lets enter what one facet transmits unmasked and returns to the body what one facet reflects; the rest is lost.
+In fitmat all enters that the face does not reflect, and all returns that does not leave.
 """
 
-RETURNED = {0.03: (0.583, 0.596), 0.1: (0.552, 0.594), 0.3: (0.415, 0.597), 1.0: (0.117, 0.676)}
+RETURNED = {0.03: (0.583, 0.596), 0.1: (0.552, 0.590), 0.3: (0.415, 0.579), 1.0: (0.117, 0.564)}
 """alpha → the share R of diffuse light that the underside returns, eta 1.5: Mitsuba's and fitmat's."""
 
 ETA = 1.5
@@ -298,10 +299,9 @@ def _coat(alpha: float) -> RoughCoat:
     return RoughCoat(jnp.array(ETA), jnp.array(alpha), jnp.zeros(()), "separable")
 
 
-def _crossing(alpha: float) -> np.ndarray:
-    """Fitmat's T at the cosines of Mitsuba's table."""
-    cosines = jnp.clip(jnp.array(rough_interface.TABLE), 1e-6, 1 - 1e-15)
-    return np.asarray(jax.jit(jax.vmap(lambda c: _coat(alpha).crossing(c, jnp.array(ETA))))(cosines))
+def _entering(alpha: float, cosines: np.ndarray) -> np.ndarray:
+    """What fitmat lets enter the body."""
+    return 1 - np.asarray(jax.jit(lambda c: _coat(alpha).reflectance()(c))(jnp.array(cosines)))
 
 
 @pytest.mark.parametrize("alpha", [0.1, 0.3, 1.0])
@@ -314,23 +314,21 @@ def test_face_of_rough_plastic_agrees_with_mitsuba(mitsuba: ModuleType, alpha: f
 
 
 @pytest.mark.parametrize("alpha", always({0.1, 1.0}, PLASTIC))
-def test_transmittance_of_rough_plastic_agrees_with_mitsuba(mitsuba: ModuleType, alpha: float) -> None:
-    """Mitsuba's T is its Gauss rule over visible normals to single precision, ours the integral of the same."""
+def test_fitmat_lets_enter_what_mitsuba_transmits_or_loses(mitsuba: ModuleType, alpha: float) -> None:
+    """Mitsuba's T is its Gauss rule over visible normals to single precision; ours adds what is masked behind them."""
     theirs, _ = _tables(mitsuba, alpha)
-    ours, rule, fine = _crossing(alpha)[1:], rough_interface.gauss(32), rough_interface.fine(300)
-    by_rule = [rough_interface.share(c, alpha, ETA, rule)[1] for c in rough_interface.TABLE[1:]]
-    exact = [rough_interface.share(c, alpha, ETA, fine)[1] for c in rough_interface.TABLE[1::6]]
-    np.testing.assert_allclose(theirs, by_rule, rtol=SUMS)
-    np.testing.assert_allclose(ours[::6], exact, rtol=INTEGRAL)
-    np.testing.assert_allclose(ours, theirs, rtol=RULE)
+    cosines, rule, fine = rough_interface.TABLE[1:], rough_interface.gauss(32), rough_interface.fine(200)
+    np.testing.assert_allclose(theirs, [rough_interface.share(c, alpha, ETA, rule)[1] for c in cosines], rtol=SUMS)
+    lost = [1 - sum(rough_interface.share(c, alpha, ETA, fine)) for c in cosines[::6]]
+    np.testing.assert_allclose(_entering(alpha, cosines[::6]), theirs[::6] + lost, atol=ENTERING)
 
 
 @pytest.mark.parametrize("alpha", always({0.1, 1.0}, RETURNED))
 def test_returned_light_of_rough_plastic_is_what_mitsuba_and_fitmat_define(mitsuba: ModuleType, alpha: float) -> None:
     """Mitsuba: the mean of R_1(c) c over its 64 cosines, doubled; R_1 of one scattering, from inside.
 
-    That sum weighs c = 1 fully: it is 1.4 % below the integral. Fitmat: 1 − 2∫ T′ c dc, and by reciprocity of the
-    crossing T′ integrates to what T does over eta².
+    That sum weighs c = 1 fully: it is 1.4 % below the integral. Fitmat: 1 − (1 − Ē)/eta², Ē the mean of what the face
+    reflects from outside (Judd 1942).
     """
     _, theirs = _tables(mitsuba, alpha)
     cosines, rule = np.maximum(rough_interface.TABLE, 1e-6), rough_interface.gauss(128)
@@ -339,23 +337,30 @@ def test_returned_light_of_rough_plastic_is_what_mitsuba_and_fitmat_define(mitsu
     integral = 2 * np.trapezoid(reflected * cosines, cosines)
     assert theirs / integral == pytest.approx(1 - 0.014, abs=0.002)
     nodes, weights = np.polynomial.legendre.leggauss(24)
-    crossing = [rough_interface.share((x + 1) / 2, alpha, ETA, rough_interface.fine(200))[1] for x in nodes]
-    ours = float(_coat(alpha).returned())
-    assert ours == pytest.approx(1 - weights @ (crossing * (nodes + 1) / 2) / ETA**2, rel=2e-3)
+    mirrored = [rough_interface.share((x + 1) / 2, alpha, ETA, rough_interface.fine(200))[0] for x in nodes]
+    ours = float(_coat(alpha).layer().returned()[0])
+    assert ours == pytest.approx(1 - (1 - weights @ (mirrored * (nodes + 1) / 2)) / ETA**2, rel=2e-3)
     assert (round(theirs, 3), round(ours, 3)) == pytest.approx(RETURNED[alpha], abs=0.002)
 
 
 @pytest.mark.parametrize("alpha", PLASTIC)
-def test_rough_plastic_is_mitsubas_but_for_the_returned_light(mitsuba: ModuleType, alpha: float) -> None:
-    """Our T at Mitsuba's 64 cosines and its R, put together as its source says, give its values; then ours as it is."""
+def test_rough_plastic_is_mitsubas_but_for_what_enters_and_returns(mitsuba: ModuleType, alpha: float) -> None:
+    """Our body with Mitsuba's T and R in the place of ours is its body; then ours as it is."""
     lobe, kd = Lobe("ggx", alpha, alpha), 0.5
     wi, wo = _pairs(lobe)
-    ci, co, table, (_, returned) = _exact(wi)[:, 2], _exact(wo)[:, 2], _crossing(alpha), _tables(mitsuba, alpha)
-    through = np.interp(ci, rough_interface.TABLE, table) * np.interp(co, rough_interface.TABLE, table)
+    ci, co, (through, returned) = _exact(wi)[:, 2], _exact(wo)[:, 2], _tables(mitsuba, alpha)
+    first = rough_interface.share(1e-6, alpha, ETA, rough_interface.gauss(32))[1]
+    table, ours_returned = np.concatenate([[first], through]), float(_coat(alpha).layer().returned()[0])
+    theirs_enter = np.interp(ci, rough_interface.TABLE, table) * np.interp(co, rough_interface.TABLE, table)
+    exchanged = theirs_enter / (_entering(alpha, ci) * _entering(alpha, co))
+    body, ours = (
+        _ours(fm.model("plastic", alpha=alpha, eta=ETA, kd=kd, ks=ks, masking="separable"), wi, wo)[:, 0]
+        for ks in (0.0, 1.0)
+    )
     for nonlinear in (True, False):
-        body = kd / (1 - returned * (kd if nonlinear else 1)) / (np.pi * ETA**2) * through * co
+        shared = exchanged * (1 - kd * ours_returned) / (1 - returned * (kd if nonlinear else 1))
         theirs = _theirs(mitsuba, _plastic(alpha, kd, 0.0, nonlinear=nonlinear), wi, wo)
-        np.testing.assert_allclose(body, theirs, rtol=3 * RULE)
+        np.testing.assert_allclose(body * shared, theirs, rtol=3 * RULE)
     both = _theirs(mitsuba, _plastic(alpha, kd, 1.0), wi, wo)
-    ours = _ours(fm.model("plastic", alpha=alpha, eta=ETA, kd=kd, masking="separable"), wi, wo)[:, 0]
-    assert np.max(np.abs(ours / both - 1)) == pytest.approx(PLASTIC[alpha], rel=MEASURED)
+    level = np.minimum(ci, co) > 0.2
+    assert np.max(np.abs(ours / both - 1)[level]) == pytest.approx(PLASTIC[alpha], rel=MEASURED)

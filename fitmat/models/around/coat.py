@@ -1,36 +1,22 @@
 """Coats: a smooth or rough dielectric layer, with absorption, over any base."""
 
 from abc import abstractmethod
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
-import numpy as np
 
-from fitmat._types import Scalar, Spectrum, Vec3
-from fitmat.maths.directions import COS_MIN, above
-from fitmat.maths.quadrature import curve, facets
+from fitmat._types import Array, Scalar, Spectrum, Vec3
+from fitmat.maths.directions import above
+from fitmat.models.around.exchange import exchange, mirrored
+from fitmat.models.around.face import face_albedo
+from fitmat.models.around.layer import Layer
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.lobes.microfacet import Microfacet
 from fitmat.models.parameters import param
 from fitmat.models.terms.distributions import GGX, Isotropic, Masking
 from fitmat.models.terms.fresnel import Dielectric, dielectric
-
-NODES = (32, 16)
-"""Of the integrals over the facets of a rough coat, zenith and azimuth.
-
-T is then off by at most 1e-4 (for eta below 1.1 and alpha below 0.01, by 0.003), R by 0.001.
-"""
-
-
-def _gauss(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes and weights on [0, 1]."""
-    x, weights = np.polynomial.legendre.leggauss(count)
-    return (x + 1) / 2, weights / 2
-
-
-_GAUSS = _gauss(16)
 
 
 def _eta() -> Any:
@@ -48,7 +34,7 @@ def _depth() -> Any:
 
 
 class AbstractCoat(eqx.Module):
-    """A dielectric layer: what it mirrors, lets through and sends back down."""
+    """A dielectric layer: what its upper face mirrors, and how much."""
 
     name: ClassVar[str]
     eta: eqx.AbstractVar[Scalar]
@@ -59,16 +45,20 @@ class AbstractCoat(eqx.Module):
         """BRDF of its upper face, sr⁻¹."""
 
     @abstractmethod
-    def transmitted(self, wi: Vec3, wo: Vec3) -> Scalar:
-        """Fraction that enters from ω_i times the fraction that leaves towards ω_o, without absorption."""
+    def mirror(self, cos: Scalar) -> Scalar:
+        """Fraction that its upper face reflects in the mirror direction alone."""
 
     @abstractmethod
-    def returned(self) -> Spectrum:
-        """Fraction of evenly spread light from below that comes back down, absorbed on both passages."""
+    def reflectance(self) -> Callable[[Array], Array]:
+        """Cosine → fraction of the light from there that its upper face reflects; the rest enters."""
 
     @abstractmethod
     def width(self) -> Scalar:
         """Of its lobe; 1 where it has none."""
+
+    def layer(self) -> Layer:
+        """The coat as the light within it sees it."""
+        return Layer(self.eta, self.depth, self.reflectance())
 
 
 class SmoothCoat(AbstractCoat):
@@ -82,23 +72,13 @@ class SmoothCoat(AbstractCoat):
         """0 in all but one direction."""
         return jnp.zeros(())
 
-    def transmitted(self, wi: Vec3, wo: Vec3) -> Scalar:
-        """(1 − F(c_i))(1 − F(c_o))."""
-        enter, leave = (1.0 - dielectric(jnp.clip(w[2], 0.0, 1.0), self.eta) for w in (wi, wo))
-        return enter * leave
+    def mirror(self, cos: Scalar) -> Scalar:
+        """F(c)."""
+        return dielectric(cos, self.eta)
 
-    def returned(self) -> Spectrum:
-        """2∫ R(c′) exp(−2τ/c′) c′ dc′ over the inner cosine c′.
-
-        Total reflection below the critical cosine is one part; the other is integrated over the outer cosine c, with
-        c′ dc′ = c dc/η².
-        """
-        cos, share = (jnp.asarray(part) for part in _GAUSS)
-        critical = _critical(self.eta)
-        inner = jnp.sqrt(1.0 - (1.0 - cos**2) / self.eta**2)
-        total = 2.0 * critical**2 * share * cos
-        partial = 2.0 * share * cos * dielectric(cos, self.eta) / self.eta**2
-        return _absorbed(critical * cos, self.depth) @ total + _absorbed(inner, self.depth) @ partial
+    def reflectance(self) -> Callable[[Array], Array]:
+        """F(c)."""
+        return lambda cos: dielectric(cos, self.eta)
 
     def width(self) -> Scalar:
         """None."""
@@ -122,74 +102,47 @@ class RoughCoat(AbstractCoat):
         face = Microfacet(jnp.ones(()), Isotropic(self.alpha), Dielectric(self.eta), GGX(), self.masking)
         return face(wi, wo)
 
-    def transmitted(self, wi: Vec3, wo: Vec3) -> Scalar:
-        """T(c_i) T(c_o), T(c) = ∫ (1 − F) G1(ω_t) over the visible normals."""
-        through = curve(lambda cos: self.crossing(cos, self.eta))
-        return jnp.clip(through(wi[2]), 0.0, 1.0) * jnp.clip(through(wo[2]), 0.0, 1.0)
+    def mirror(self, cos: Scalar) -> Scalar:
+        """0: its image is a lobe."""
+        return jnp.zeros_like(cos)
 
-    def returned(self) -> Spectrum:
-        """2∫ (1 − T′(c′)) exp(−2τ/c′) c′ dc′: what does not cross from inside comes back."""
-        part, share = (jnp.asarray(half) for half in _GAUSS)
-        edge = jax.lax.stop_gradient(_critical(self.eta))
-        cos = jnp.concatenate([edge * part, edge + (1.0 - edge) * part])
-        shares = jnp.concatenate([edge * share, (1.0 - edge) * share])
-        inside = 1.0 - jax.vmap(lambda c: self.crossing(c, 1.0 / self.eta))(jnp.maximum(cos, COS_MIN))
-        return _absorbed(cos, self.depth) @ (2.0 * shares * cos * inside)
-
-    def crossing(self, cos: Scalar, eta: Scalar) -> Scalar:
-        """Share of the light from a cosine that crosses the face at one facet and is not masked behind it.
-
-        ∫ D_ω(h) (1 − F) G1(ω_t) dω_h, with the visible normals D_ω(h) = G1(ω) (ω·h) D(h)/c; Walter et al. 2007,
-        eq. 40 for ω_t. `eta` is the index behind the face over that before it.
-        """
-        slopes, normals = (self.alpha, self.alpha), facets(jnp.arccos(cos), self.alpha, nodes=NODES)
-        w = normals.wi
-
-        def one(h: Vec3) -> Scalar:
-            c = jnp.clip(w @ h, 0.0, 1.0)
-            seen = c * GGX().density(h, slopes) / GGX().masked_cos(w, slopes)
-            inner = jnp.sqrt(jnp.maximum(1.0 - (1.0 - c**2) / eta**2, 1e-16))
-            through = w / eta - (c / eta - inner) * h
-            leaving = jnp.where(through[2] > 0.0, through[2] / GGX().masked_cos(through, slopes), 0.0)
-            return seen * leaving * (1.0 - dielectric(c, eta))
-
-        return normals.solid @ jax.vmap(one)(normals.h)
+    def reflectance(self) -> Callable[[Array], Array]:
+        """The albedo of its lobe."""
+        return face_albedo(self.alpha, Dielectric(self.eta), self.masking)
 
     def width(self) -> Scalar:
         """Alpha itself."""
         return self.alpha
 
 
-def _critical(eta: Scalar) -> Scalar:
-    """Cosine of the angle of total reflection inside, √(1 − 1/η²)."""
-    return jnp.sqrt(jnp.maximum(1.0 - 1.0 / eta**2, 1e-16))
-
-
-def _absorbed(cos: Spectrum, depth: Spectrum) -> Spectrum:
-    """exp(−2τ/c), the light left after going up and down at cosines (k,); (k,) or (c, k) as τ is one or c numbers."""
-    return jnp.exp(-2.0 * depth[..., None] / jnp.maximum(cos, COS_MIN))
-
-
 class Varnish(AbstractBRDF):
     """A dielectric coat over a base: `varnish-over-BASE` (polished), `rough-varnish-over-BASE` (GGX face).
 
-    f = f_c + T(c_i) T(c_o)/η² · exp(−τ/c_i′ − τ/c_o′) · (f_b(ω_i′, ω_o′) + ρ² R/(π(1 − ρR)))
+    f = f_c + T(c_i) T(c_o)/η² · exp(−τ/c_i′ − τ/c_o′) · (f_b(ω_i′, ω_o′) h(c_i) h(c_o) + η² e(c_i) e(c_o)/(π ē))
 
-    ω′ are the directions refracted into the coat, f_b is the base and ρ its diffuse albedo, R the share of diffuse
-    light that the coat's underside returns: for a Lambert base the last term sums up to ρ/(π(1 − ρR)).
+    ω′ are the directions refracted into the coat, f_b is the base, T(c) what the face does not reflect: 1 − F, or 1 −
+    the albedo of the lobe of a rough face. What the underside returns meets the base again, any number of times: h and
+    e come from the adding equation for energies, solved with the base's own values. h² = 1/(1 − s), s being what one
+    more bounce adds to the base in the mirror direction, relative, raises the base's lobe; e is the energy that leaves
+    besides, spread as Kulla & Conty spread it, ē = 2∫ e T exp(−τ/c′) c dc. For a Lambert base all of it is
+    Saunderson's kd/(π(1 − kd R)), R the share of even light that the underside returns.
 
     Parameters: eta, index of the coat, 1 to 3, shared; depth, absorption coefficient times thickness, 0 to 10, per
     channel: 0.1 is yellowed varnish; alpha, slope of the face, rough coat only, 0.001 to 1: 0.03 is glossy; and those
     of the base.
 
     Limits: the mirror image in a polished coat is a single direction, which no BRDF value holds: peaks that were
-    measured need the rough coat. The base is seen along directions refracted at the mean normal; what is lost
-    between facets is not given back; only the diffuse part of the base exchanges light with the coat. Positive,
-    reciprocal, conserves energy where the base does.
+    measured need the rough coat. The albedo with the mirror is that of photons within 0.8 % for smooth coats; for
+    rough ones over a diffuse base within 1 % up to 60°, 3 % at 80°; and 1 over a base that keeps all. Where light goes
+    that came back several times is approximate: the peak over a metal (F0 0.9) is right to 1 % at normal incidence,
+    5 % at 60°. Under a rough face the base is seen along directions refracted at the mean normal: its lobe is not
+    widened, and a metal is too bright, its albedo by 0.01 at alpha 0.1, 0.04 at 0.3, 0.09 at 1. eta = 1 is the base.
+    Positive, reciprocal, conserves energy where the base does.
 
-    References: J. Saunderson, Calculation of the color of pigmented plastics, JOSA 32, 1942; B. Walter et al., EGSR
-    2007; A. Weidlich & A. Wilkie, Arbitrarily layered micro-facet surfaces, GRAPHITE 2007 (refracted directions and
-    absorption); W. Jakob et al., Mitsuba 3, plugins `plastic` and `roughplastic`.
+    References: J. Saunderson, Calculation of the color of pigmented plastics, JOSA 32, 1942; K. N. Liou, An
+    Introduction to Atmospheric Radiation, 2002, sec. 6.4 (adding); C. Kulla & A. Conty, SIGGRAPH course 2017; A.
+    Weidlich & A. Wilkie, Arbitrarily layered micro-facet surfaces, GRAPHITE 2007 (refracted directions and
+    absorption); W. Jakob et al., Mitsuba 3, plugin `plastic`.
 
     Example: `fm.model("rough-varnish-over-lambert", kd=0.4, alpha=0.05, depth=0.1)`
     """
@@ -204,13 +157,16 @@ class Varnish(AbstractBRDF):
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """What the coat mirrors, and what the base sends through it."""
-        coat = self.coat
-        down, up = _refracted(wi, coat.eta), _refracted(wo, coat.eta)
-        rho, back = self.base.diffuse_albedo(), coat.returned()
-        again = rho**2 * back / (jnp.pi * (1.0 - rho * back))
-        left = jnp.exp(-coat.depth * (1.0 / down[2] + 1.0 / up[2]))
-        inner = coat.transmitted(wi, wo) / coat.eta**2 * left * (self.base(down, up) + again)
-        return jnp.where(above(wi, wo), coat.mirrored(wi, wo) + inner, 0.0)
+        layer = self.coat.layer()
+        light = exchange(self.base, layer)
+        down, up = layer.refracted(wi), layer.refracted(wo)
+        enter, leave = layer.crossing(wi[2], down[2])[0], layer.crossing(wo[2], up[2])[0]
+        body = self.base(down, up) * light.raised(wi[2]) * light.raised(wo[2]) + light.spread(wi[2], wo[2])
+        return jnp.where(above(wi, wo), self.coat.mirrored(wi, wo) + enter * leave / layer.eta**2 * body, 0.0)
+
+    def mirror(self, wi: Vec3) -> Spectrum:
+        """That of the polished face, and of a polished coat below it through this one."""
+        return self.coat.mirror(wi[2]) + mirrored(self.base, self.coat.layer(), wi)
 
     def width(self) -> Scalar:
         """Of the narrower of coat and base."""
@@ -224,9 +180,3 @@ class Varnish(AbstractBRDF):
     def diffuse_albedo(self) -> Spectrum:
         """At most that of the base."""
         return self.base.diffuse_albedo()
-
-
-def _refracted(w: Vec3, eta: Scalar) -> Vec3:
-    """The direction inside the coat, still pointing up: sin θ′ = sin θ/η, cos θ′ = √(η² − 1 + cos² θ)/η."""
-    square = (eta - 1.0) * (eta + 1.0) + jnp.maximum(w[2], 0.0) ** 2  # without the cancellation of 1 − sin² θ/η²
-    return jnp.stack([w[0], w[1], jnp.sqrt(jnp.maximum(square, COS_MIN**2))]) / eta

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import equinox as eqx
 
-from fitmat._types import Scalar, Spectrum
+from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.models.base import AbstractBRDF
 
 
@@ -37,6 +37,10 @@ class AbstractShown(AbstractBRDF):
     def isotropic(self) -> bool:
         """Where the base is, and level."""
         return self.level and self.base.isotropic
+
+    def mirror(self, wi: Vec3) -> Spectrum:
+        """That of the base."""
+        return self.base.mirror(wi)
 
     def diffuse_albedo(self) -> Spectrum:
         """That of the base."""

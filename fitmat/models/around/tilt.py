@@ -60,6 +60,12 @@ class Tilted(AbstractShown):
         ratio = light[2] / jnp.maximum(wi[2], COS_MIN)
         return jnp.where(above(wi, wo), self.base(light, sensor) * ratio, 0.0)
 
+    def mirror(self, wi: Vec3) -> Spectrum:
+        """That of the base in the tilted frame, per irradiance of the level one."""
+        light = self._local(wi)
+        seen = jnp.where(light[2] > 0.0, self.base.mirror(light), 0.0)
+        return seen * light[2] / jnp.maximum(wi[2], COS_MIN)
+
     def _local(self, w: Vec3) -> Vec3:
         """w turned so that n′ becomes e = +z: w − ((n′+e)·w)/(1 + n′·e) (n′+e) + 2 (n′·w) e, two reflections."""
         n = jnp.stack([jnp.tan(jnp.deg2rad(self.tilt_x)), jnp.tan(jnp.deg2rad(self.tilt_y)), jnp.ones(())])
