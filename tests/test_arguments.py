@@ -129,6 +129,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             **dict.fromkeys(("theta_i", "theta_o", "phi", "phi_i"), (*NUMBERS, np.nan)),
             **dict.fromkeys(("relative_noise", "absolute_noise"), NUMBER),
             "seed": WHOLE,
+            "samples": without(WHOLE, NOTHING),
             "give_sigma": FLAG,
             "instrument": NOUN,
         },
@@ -148,6 +149,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
         {
             "model": without(NOUN, AbstractBRDF),
             **dict.fromkeys(("wi", "wo"), (*NUMBERS, 0.5, [0.5], [[1.0, 1.0, 1.0]])),
+            **dict.fromkeys(("samples", "seed"), without(WHOLE, NOTHING)),
         },
     ),
     "albedo": (

@@ -44,6 +44,7 @@ from fitmat.cli.flags.simulate import (
     NoiseFlag,
     PhiFlag,
     PhiIFlag,
+    SamplesFlag,
     SetFlag,
     SimulatedOutFlag,
     SimulatedSeedFlag,
@@ -136,7 +137,8 @@ def fit(
     cls=Command,
     epilog="Parameters that are not set keep the model's defaults, see fitmat models.\n\n"
     "Example:\n\n"
-    "  fitmat simulate lambert+ggx --set kd=0.3 --set alpha=0.2 --out plastic.csv",
+    "  fitmat simulate lambert+ggx --set kd=0.3 --set alpha=0.2 --out plastic.csv\n\n"
+    "  fitmat simulate ggx-slab-schlick --set alpha=0.6 --set f0=0.9 --samples 4096 --out rough.csv",
 )
 @takes(instrument)
 def simulate(
@@ -151,6 +153,7 @@ def simulate(
     noise: NoiseFlag = 0.02,
     floor: FloorFlag = 1e-3,
     seed: SimulatedSeedFlag = 0,
+    samples: SamplesFlag = None,
     masking: MaskingFlag = None,
     catalogue: CatalogueFlag = None,
     force: ReplaceFlag = False,
@@ -165,7 +168,7 @@ def simulate(
         angles = simulate.grid(theta_i, theta_o, phi, phi_i)
         truth = simulate.truth(model, set_ or [], masking)
         written = simulate.write_simulation(
-            out, truth, angles, noise=(noise, floor, seed), instrument=instrument, force=force
+            out, truth, angles, noise=(noise, floor, seed), samples=samples, instrument=instrument, force=force
         )
     process.say("\n".join(visible(str(path)) for path in written))
 

@@ -19,10 +19,11 @@ from rich.text import Text
 from fitmat.fitting.losses import LOSSES
 from fitmat.maths import programs
 from fitmat.models import laws
-from fitmat.models.registry import LOBES, lobe_names, model
+from fitmat.models.estimated import Walked
+from fitmat.models.registry import LOBES, WALKS, Lobe, lobe_names, model
 
-FRESNEL, TRANSMISSION = "fresnel", "transmission"
-"""Pages of no lobe: the Fresnel terms compared, and what a dielectric interface lets through."""
+FRESNEL, TRANSMISSION, HEITZ = "fresnel", "transmission", "heitz"
+"""Pages of no lobe: the Fresnel terms compared, what a dielectric interface lets through, and multiple scattering."""
 
 GLASS = 1.5
 """Index of the interfaces on that page."""
@@ -39,7 +40,8 @@ def list_models() -> None:
         "\nA model is a sum of lobes, lambert+ggx or lambert+ggx-schlick, alone or below a cover: "
         "varnish-over-lambert+ggx.\n'fitmat models ggx' prints the manual page of a lobe, 'fitmat models fresnel' how "
         "exact the Fresnel terms are, 'fitmat models transmission' what a dielectric interface lets through, "
-        "'fitmat models --check' which laws the lobes keep.",
+        "'fitmat models heitz' multiple scattering without approximation, 'fitmat models --check' which laws the lobes "
+        "keep.",
         highlight=False,
     )
 
@@ -91,6 +93,9 @@ def page(name: str) -> None:
     if name in (FRESNEL, TRANSMISSION):
         {FRESNEL: fresnel_terms, TRANSMISSION: transmission}[name]()
         return
+    if name == HEITZ or name in WALKS:
+        walked(name)
+        return
     out = Console()
     for part in _parts(name):
         lobe = LOBES[part]
@@ -98,12 +103,28 @@ def page(name: str) -> None:
         _prose(out, lobe.shape.__doc__)
         for law, words in lobe.breaks.items():
             out.print(f"Breaks the law '{law}' ({laws.LAWS[law]}): {words}.\n", markup=False, highlight=False)
-        table = _table("parameter", "symbol", "range", "unit", "default", "channels", "meaning")
-        for key, (p, default) in lobe.defaults().items():
-            spread = "one each" if lobe.per_channel(key) else "shared"
-            unit = "" if p.unit == "1" else p.unit
-            table.add_row(key, p.symbol, f"{p.lower:g} – {p.upper:g}", unit, f"{default:g}", spread, p.doc)
-        out.print(table)
+        _parameters(out, lobe)
+
+
+def walked(name: str) -> None:
+    """Print the page of multiple scattering, with the parameters of one of `WALKS`, or the names of all."""
+    out = Console()
+    out.print(f"[bold]{name}[/bold]\n")
+    _prose(out, Walked.__doc__)
+    if name in WALKS:
+        _parameters(out, LOBES[WALKS[name][0]])
+    else:
+        out.print(f"Names: {', '.join(WALKS)}.", markup=False, highlight=False)
+
+
+def _parameters(out: Console, lobe: Lobe) -> None:
+    """The table of a lobe's parameters."""
+    table = _table("parameter", "symbol", "range", "unit", "default", "channels", "meaning")
+    for key, (p, default) in lobe.defaults().items():
+        spread = "one each" if lobe.per_channel(key) else "shared"
+        unit = "" if p.unit == "1" else p.unit
+        table.add_row(key, p.symbol, f"{p.lower:g} – {p.upper:g}", unit, f"{default:g}", spread, p.doc)
+    out.print(table)
 
 
 def _prose(out: Console, text: str | None) -> None:

@@ -13,12 +13,16 @@ from fitmat.files import write_text
 from fitmat.measurements.formats import csv
 from fitmat.measurements.instrument import Instrument
 from fitmat.models import catalogue, simulation
-from fitmat.models.base import AbstractBRDF
+from fitmat.models.base import AbstractBRDF, AbstractEstimated
 from fitmat.models.parameters import assignments
 from fitmat.models.registry import model
 
 MOST_ANGLES = 10_000
 """More angles than this on one axis are a slip of the keyboard."""
+
+
+SAMPLES = 4096
+"""Paths for each geometry of a model that is estimated, where the user gives no number."""
 
 
 def angles(text: str, option: str, *, lowest: float = -90.0, highest: float = 90.0) -> np.ndarray:
@@ -80,6 +84,7 @@ def write_simulation(
     geometry: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     *,
     noise: tuple[float, float, int],
+    samples: int | None,
     instrument: Instrument,
     force: bool,
 ) -> tuple[Path, ...]:
@@ -90,6 +95,7 @@ def write_simulation(
         material: The true model.
         geometry: theta_i, signed theta_o, phi and phi_i in degrees; every combination is measured.
         noise: Relative noise, absolute noise in sr⁻¹, seed.
+        samples: Paths for each geometry where the model is estimated; None for `SAMPLES`.
         instrument: What measures it.
         force: Replace an existing file.
 
@@ -99,6 +105,8 @@ def write_simulation(
     _refuse_existing([path], force)
     theta_i, theta_o, phi, phi_i = (np.deg2rad(part) for part in geometry)
     relative, absolute, seed = noise
+    if samples is None and isinstance(material, AbstractEstimated):
+        samples = SAMPLES
     measured = simulation.simulate(
         material,
         theta_i,
@@ -109,9 +117,11 @@ def write_simulation(
         absolute_noise=absolute,
         seed=seed,
         instrument=instrument,
+        samples=samples,
     )
     described = f"simulated {material.name}; noise {relative:g} relative + {absolute:g} sr^-1, seed {seed}"
-    comments = [described, *filter(None, [str(instrument)])]
+    paths = f"an estimate of {samples} paths a geometry, whose standard error is part of sigma" if samples else ""
+    comments = [described, *filter(None, [paths, str(instrument)])]
     return (write_text(path, csv.dump(measured, comments)),)
 
 

@@ -14,7 +14,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from fitmat.errors import ModelError
 from fitmat.maths.arrays import library
+from fitmat.models.around.shown import surface
+from fitmat.models.base import AbstractBRDF, AbstractEstimated
+from fitmat.models.estimated import unfitted
 from fitmat.models.parameters import Entry, entries, with_vector
 from fitmat.text import visible
 
@@ -166,7 +170,13 @@ def coordinates(
         model: Gives shapes and bounds.
         held: Names of parameters to leave out.
         channels: For the names.
+
+    Raises:
+        ModelError: the model has no formula.
     """
+    bare = surface(model) if isinstance(model, AbstractBRDF) else model
+    if isinstance(bare, AbstractEstimated):
+        raise ModelError(unfitted(bare.name))
     kept = [e for e in entries(model) if not held or e.name not in held]
     each = [(e.param, place) for e in kept for place in range(e.place.start, e.place.stop)]
     return Coordinates(

@@ -3,10 +3,11 @@
 No formula of any material stands here.
 """
 
+import dataclasses
 from abc import abstractmethod
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, overload
 
 import equinox as eqx
 import jax
@@ -19,6 +20,7 @@ from fitmat._types import Directions, Samples, Scalar, Spectrum, Vec3
 from fitmat.errors import ModelError
 from fitmat.maths.programs import program
 from fitmat.models.parameters import param
+from fitmat.text import brief
 
 
 class AbstractBRDF(eqx.Module):
@@ -155,6 +157,34 @@ class Sum(AbstractBRDF):
         return jnp.minimum(sum((lobe.diffuse_albedo() for lobe in self.lobes[1:]), self.lobes[0].diffuse_albedo()), 1.0)
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class MonteCarlo:
+    """An estimate.
+
+    Attributes:
+        value: Mean over the paths; one row per pair or incidence, one column per channel.
+        standard_error: Its standard error, same shape.
+        omitted: Fraction of the incident energy in paths that were cut, missing in `value`; one per row.
+        samples: Paths followed per row.
+    """
+
+    value: Float[np.ndarray, "n c"]
+    standard_error: Float[np.ndarray, "n c"]
+    omitted: Float[np.ndarray, " n"]
+    samples: int
+    __repr__ = brief
+
+
+class AbstractEstimated(AbstractBRDF):
+    """A model without a formula, whose values are estimated; it can be evaluated and simulated, and not fitted."""
+
+    @abstractmethod
+    def estimate(
+        self, wi: Float[np.ndarray, "n 3"], wo: Float[np.ndarray, "n 3"], *, samples: int, seed: int
+    ) -> MonteCarlo:
+        """Values with their standard errors; 0 where a direction is not above the surface."""
+
+
 def evaluate_pairs(model: AbstractBRDF, wi: Directions, wo: Directions) -> Samples:
     """The model over n pairs, without checks; traceable by JAX."""
     return jax.vmap(lambda a, b: jnp.atleast_1d(model(a, b)))(wi, wo)
@@ -181,19 +211,29 @@ def direction_pairs(wi: ArrayLike, wo: ArrayLike) -> list[Float[np.ndarray, "n 3
     return pair
 
 
-def evaluate(model: AbstractBRDF, wi: ArrayLike, wo: ArrayLike) -> Float[np.ndarray, "n c"]:
+@overload
+def evaluate(model: AbstractBRDF, wi: ArrayLike, wo: ArrayLike) -> Float[np.ndarray, "n c"]: ...
+@overload
+def evaluate(model: AbstractBRDF, wi: ArrayLike, wo: ArrayLike, *, samples: int, seed: int) -> MonteCarlo: ...
+def evaluate(
+    model: AbstractBRDF, wi: ArrayLike, wo: ArrayLike, *, samples: int | None = None, seed: int | None = None
+) -> Float[np.ndarray, "n c"] | MonteCarlo:
     """BRDF values in sr⁻¹ (no cosine) for n pairs of directions.
 
     Args:
         model: From `fitmat.model`.
         wi: Unit vectors to the light, (n, 3), local frame with the normal +z.
         wo: Unit vectors to the sensor, (n, 3).
+        samples: Paths for each pair, at least 2, of a model that is estimated, such as `ggx-walk`; for no other.
+        seed: Of its random numbers.
 
     Returns:
-        Values (n, c), one column per channel; 0 where a direction is below the horizon.
+        Values (n, c), one column per channel; 0 where a direction is below the horizon. Of a model that is estimated
+        a `MonteCarlo`: such values with their standard errors.
 
     Raises:
-        ModelError: the shapes differ or the vectors are not of unit length.
+        ModelError: the shapes differ, the vectors are not of unit length, or samples and seed are not there where
+            they are needed, or where they are not.
 
     Example:
         >>> import fitmat as fm, numpy as np
@@ -208,9 +248,27 @@ def evaluate(model: AbstractBRDF, wi: ArrayLike, wo: ArrayLike) -> Float[np.ndar
         if not np.allclose(length, 1.0, atol=1e-6):
             row = int(np.argmax(np.abs(length - 1.0)))
             raise ModelError(f"{label} row {row} has length {length[row]:.6g}: expected unit vectors.")
+    if isinstance(model, AbstractEstimated):
+        arguments.whole("samples", samples, 2)
+        arguments.whole("seed", seed)
+        assert samples is not None
+        assert seed is not None
+        return model.estimate(*pair, samples=samples, seed=seed)
+    refuse_sampling(model, samples=samples, seed=seed)
     count = len(pair[0])
     wi, wo = (np.pad(w, ((0, padded_length(count) - count), (0, 0)), mode="edge") for w in pair)
     return np.asarray(_evaluate_jit(model, wi, wo))[:count]
+
+
+def refuse_sampling(model: AbstractBRDF, **given: object) -> None:
+    """Stop where a model with a formula is given what only an estimate takes.
+
+    Raises:
+        ModelError: names it.
+    """
+    for name, value in given.items():
+        if value is not None:
+            raise ModelError(f"{name} = {value!r} beside {model.name}, expected None: its values are exact.")
 
 
 _evaluate_jit = program(evaluate_pairs)

@@ -6,7 +6,7 @@ Knows no formula; every lobe is described where it is defined.
 import dataclasses
 import difflib
 from collections.abc import Callable, Mapping
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import equinox as eqx
 import numpy as np
@@ -18,6 +18,7 @@ from fitmat.models.around.coat import RoughCoat, SmoothCoat, Varnish
 from fitmat.models.around.plastic import Plastic
 from fitmat.models.around.tilt import Tilted
 from fitmat.models.base import AbstractBRDF, Sum
+from fitmat.models.estimated import Estimator, Walked, unfitted
 from fitmat.models.lobes.abg import ABg
 from fitmat.models.lobes.ashikhmin_shirley import AshikhminShirley, OneExponent, TwoExponents
 from fitmat.models.lobes.cook_torrance import CookTorrance
@@ -155,6 +156,15 @@ LOBES: dict[str, Lobe] = {
 }
 
 
+WALKS: dict[str, tuple[str, Estimator]] = {
+    f"{normals.label}-{estimator}{fresnel.suffix}": (normals.label + fresnel.suffix, estimator)
+    for normals in (GGX, Beckmann)
+    for estimator in get_args(Estimator)
+    for fresnel in FRESNELS
+}
+"""Names of multiple scattering without a formula → the lobe of its single scattering, and who estimates it."""
+
+
 def lobe_names(name: str) -> list[str]:
     """The lobes of a model name, covers first.
 
@@ -177,13 +187,13 @@ def normalised(name: str) -> str:
 
 def _parsed(name: str) -> tuple[list[str], list[str]]:
     """Covers, outermost first, and the lobes of the base."""
-    arguments.kind("name of a model", name, str)
-    *covers, base = "".join(name.split()).lower().split(OVER)
-    parts = base.split("+")
+    covers, parts = _split(name)
     known = {kind: [n for n, lobe in LOBES.items() if (lobe.kind == "cover") is kind] for kind in (True, False)}
     for part in covers + parts:
+        if part in WALKS:
+            raise ModelError(unfitted("".join(name.split()).lower()))
         if part not in LOBES:
-            close = difflib.get_close_matches(part, LOBES) or ["lambert", "phong", "ggx"]
+            close = difflib.get_close_matches(part, [*LOBES, *WALKS]) or ["lambert", "phong", "ggx"]
             raise ModelError(f"model {name!r}: no lobe {part!r}; try {', '.join(close)}; 'fitmat models' lists all.")
     for part in covers:
         if part not in known[True]:
@@ -196,12 +206,34 @@ def _parsed(name: str) -> tuple[list[str], list[str]]:
     return covers, parts
 
 
+def _split(name: str) -> tuple[list[str], list[str]]:
+    """Covers and lobes as they are written."""
+    arguments.kind("name of a model", name, str)
+    *covers, base = "".join(name.split()).lower().split(OVER)
+    return covers, base.split("+")
+
+
+def _walked(name: str, **given: Any) -> Walked:
+    """A model of which one lobe is estimated."""
+    covers, parts = _split(name)
+    walks = [part for part in parts if part in WALKS]
+    single, estimator = WALKS[walks[0]]
+    if covers or len(walks) != 1 or single in parts:
+        can = f"expected one of {', '.join(walks)}, alone or in a sum without {single}, below no cover"
+        raise ModelError(f"model {name!r}: {can}; {single} is its first collision.")
+    names = "+".join([single, *(part for part in parts if part not in WALKS)])
+    built = model(names, **{key.replace(f"{walks[0]}.", f"{single}."): value for key, value in given.items()})
+    lobe, *rest = built.lobes if isinstance(built, Sum) else (built,)
+    assert isinstance(lobe, Microfacet)
+    return Walked(lobe, Sum(tuple(rest)) if rest else None, "+".join(parts), estimator)
+
+
 def model(name: str, *, masking: str | None = None, channels: int | None = None, **values: ArrayLike) -> AbstractBRDF:
     """Build a model from its name.
 
     Args:
         name: A lobe or a sum of lobes, "lambert+ggx", under a coat, "varnish-over-lambert+ggx", or on a sample that
-            may be tilted, "tilt-over-lambert+ggx"; `fitmat models` lists the lobes.
+            may be tilted, "tilt-over-lambert+ggx"; `fitmat models` lists the lobes. One may be of `WALKS`.
         masking: "correlated", "separable" or "v-cavity" for the microfacet lobes; None keeps each lobe's own.
         channels: Give per-channel parameters this many values; None keeps what is passed.
         **values: Parameters by name; the rest take defaults. A name that two lobes share means both, or one of them
@@ -220,6 +252,8 @@ def model(name: str, *, masking: str | None = None, channels: int | None = None,
     """
     arguments.kind("masking", masking, str, optional=True)
     arguments.whole("channels", channels, 1, optional=True)
+    if any(part in WALKS for part in _split(name)[1]):
+        return _walked(name, masking=masking, channels=channels, **values)
     covers, parts = _parsed(name)
     lobes = covers + parts
     known = {key for part in lobes for key in LOBES[part].defaults()}

@@ -15,7 +15,7 @@ from fitmat.maths.directions import from_angles
 from fitmat.measurements.instrument import IDEAL, Instrument
 from fitmat.measurements.samples import Measurements, from_arrays
 from fitmat.models.around.instrument import Seen
-from fitmat.models.base import AbstractBRDF, evaluate
+from fitmat.models.base import AbstractBRDF, AbstractEstimated, evaluate, refuse_sampling
 from fitmat.models.parameters import vector
 
 
@@ -32,6 +32,7 @@ def simulate(
     channels: tuple[str, ...] | None = None,
     give_sigma: bool = True,
     instrument: Instrument = IDEAL,
+    samples: int | None = None,
 ) -> Measurements:
     """Measure a model at every combination of angles, in radians; BRDF in sr⁻¹ without cosine.
 
@@ -51,6 +52,8 @@ def simulate(
         give_sigma: Whether the measurements know their σ; never where there is no noise.
         instrument: What shows the surface. Its calibration error is drawn once, from
             ln g ~ N(0, calibration²); its dark signal must have a value.
+        samples: Paths for each geometry of a model that is estimated, such as `ggx-walk`; for no other. Its standard
+            error is part of σ.
 
     Returns:
         n = d·a·c·b samples, theta_o running fastest; a sample of σ = 0 among others is masked.
@@ -75,23 +78,40 @@ def simulate(
         arguments.numbers(name, noise, 0.0, single=True)
     if instrument.dark is None:
         raise ModelError("dark = None of the instrument (--dark fit), expected a number: there is nothing to fit yet.")
+    if isinstance(truth, AbstractEstimated) and not instrument.ideal:
+        raise ModelError(f"instrument of {truth.name}: expected an ideal one for values that are estimated.")
     turn, light, relative, sensor = _grid(theta_i, theta_o, phi, phi_i)
     _refuse_single_precision(truth)
     wi, wo = from_angles(light, turn), from_angles(np.abs(sensor), turn + relative + np.where(sensor < 0, np.pi, 0.0))
     rng = np.random.default_rng(seed)
     scale = jnp.exp(instrument.calibration * rng.normal()) if instrument.calibration else None
     shown = truth if instrument.ideal else Seen(truth, instrument, scale=scale)
-    exact = evaluate(shown, wi, wo)
+    exact, error = _values(shown, (wi, wo), samples, seed)
     if channels is not None and len(channels) != exact.shape[1]:
         raise ModelError(f"{len(channels)} channel names, expected {exact.shape[1]}, one for each of the model's.")
     sigma = np.hypot(absolute_noise, relative_noise * exact)
     value = exact + sigma * rng.normal(size=exact.shape)
+    sigma = np.hypot(sigma, error)
     given = sigma if give_sigma and relative_noise + absolute_noise > 0 else None
     source = f"simulated {truth.name}"
     measured = from_arrays(
         light, sensor, value, phi=relative, phi_i=turn, sigma=given, channels=channels, source=source
     )
     return dataclasses.replace(measured, instrument=instrument)
+
+
+def _values(
+    truth: AbstractBRDF, pair: tuple[np.ndarray, np.ndarray], samples: int | None, seed: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Values and their standard errors, 0 where there is a formula."""
+    if isinstance(truth, AbstractEstimated):
+        arguments.whole("samples", samples, 2)
+        assert samples is not None
+        found = evaluate(truth, *pair, samples=samples, seed=seed)
+        return found.value, found.standard_error
+    refuse_sampling(truth, samples=samples)
+    exact = evaluate(truth, *pair)
+    return exact, np.zeros_like(exact)
 
 
 def _grid(theta_i: ArrayLike, theta_o: ArrayLike, phi: ArrayLike, phi_i: ArrayLike) -> list[np.ndarray]:

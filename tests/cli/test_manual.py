@@ -51,6 +51,15 @@ def test_fresnel_page_ranks_the_terms(capsys):
     assert schlick > 0.1 > f82 > belcour
 
 
+def test_multiple_scattering_has_a_page_and_every_name_its_parameters(capsys):
+    """Both papers, what it is not for, and the names."""
+    manual.page("heitz")
+    out = capsys.readouterr().out
+    assert all(words in out for words in ("Heitz", "Bitterli", "not fitted", "ggx-slab-conductor"))
+    manual.page("ggx-walk-schlick")
+    assert any(line.startswith("f0 ") for line in capsys.readouterr().out.splitlines())
+
+
 def test_transmission_page_shows_what_glass_lets_through(capsys):
     """A smooth face, normal incidence: 4 % back, 96 % on; out of glass at 60° nothing."""
     manual.page("transmission")

@@ -9,7 +9,7 @@ import typer
 
 NameFlag = Annotated[
     str | None,
-    typer.Argument(help="A lobe or model, e.g. ggx or lambert+ggx; 'fresnel' for the Fresnel terms; 'transmission'."),
+    typer.Argument(help="A lobe or model, e.g. ggx or lambert+ggx; or 'fresnel', 'transmission', 'heitz'."),
 ]
 
 CheckFlag = Annotated[

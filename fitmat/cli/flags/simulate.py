@@ -44,7 +44,16 @@ NoiseFlag = Annotated[float, typer.Option(min=0, help="Relative noise, as a frac
 
 FloorFlag = Annotated[float, typer.Option(min=0, help="Absolute noise in sr⁻¹.", metavar="X")]
 
-SimulatedSeedFlag = Annotated[int, typer.Option(min=0, help="Seed of the noise.", metavar="N")]
+SamplesFlag = Annotated[
+    int | None,
+    typer.Option(
+        help="Paths for each geometry of a model that is estimated, such as ggx-walk or ggx-slab; 4096 without.",
+        metavar="N",
+        show_default=False,
+    ),
+]
+
+SimulatedSeedFlag = Annotated[int, typer.Option(min=0, help="Seed of the noise, and of paths.", metavar="N")]
 
 CatalogueFlag = Annotated[
     Path | None,

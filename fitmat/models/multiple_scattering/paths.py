@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Bool, Float, Int, PRNGKeyArray
 
 from fitmat.errors import ModelError
-from fitmat.models.base import direction_pairs
+from fitmat.models.base import MonteCarlo, direction_pairs
 from fitmat.models.multiple_scattering.surface import Colours, Walker
 from fitmat.text import brief
 
@@ -31,24 +31,6 @@ LANES = 2**13
 
 FEWEST = 32
 """Walkers per pair, at least: the standard error is found from their scatter."""
-
-
-@dataclass(frozen=True, eq=False)
-class MonteCarlo:
-    """An estimate.
-
-    Attributes:
-        value: Mean over the paths; one row per pair or incidence, one column per channel.
-        standard_error: Its standard error, same shape.
-        omitted: Fraction of the incident energy in paths that were cut, missing in `value`; one per row.
-        samples: Paths followed per row.
-    """
-
-    value: Float[np.ndarray, "n c"]
-    standard_error: Float[np.ndarray, "n c"]
-    omitted: Float[np.ndarray, " n"]
-    samples: int
-    __repr__ = brief
 
 
 class Static(NamedTuple):

@@ -38,6 +38,10 @@ Colours = Float[Array, "c n w"]
 DISTRIBUTIONS: dict[str, AbstractDistribution] = {"ggx": GGX(), "beckmann": Beckmann()}
 
 
+NUMBERS = (int, float, np.generic, np.ndarray, jax.Array)
+"""What a single number may be."""
+
+
 def _as_distribution(given: Any) -> AbstractDistribution:
     if isinstance(given, str) and given not in DISTRIBUTIONS:
         raise ModelError(f"distribution {given!r}: expected {' or '.join(DISTRIBUTIONS)}.")
@@ -45,7 +49,7 @@ def _as_distribution(given: Any) -> AbstractDistribution:
 
 
 def _as_fresnel(given: Any) -> AbstractFresnel:
-    if isinstance(given, AbstractFresnel) or not np.isscalar(given):
+    if not isinstance(given, NUMBERS):
         return given
     eta = float(arguments.numbers("fresnel", given, single=True))
     if not (np.isfinite(eta) and eta > 0.0):
@@ -55,7 +59,7 @@ def _as_fresnel(given: Any) -> AbstractFresnel:
 
 def _as_slopes(slopes: Any) -> Slopes:
     """Arrays, so that surfaces that differ in their slopes alone share a compiled program."""
-    if np.isscalar(slopes) and not isinstance(slopes, str):
+    if isinstance(slopes, NUMBERS) and np.ndim(slopes) == 0:
         slopes = (slopes, slopes)
     if not isinstance(slopes, Sequence | np.ndarray) or isinstance(slopes, str):
         arguments.refuse("slopes", slopes, "(alpha_x, alpha_y), each from 0.0001 to 2")
