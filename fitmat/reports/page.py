@@ -38,7 +38,7 @@ from fitmat.reports.rows import parameter_rows, prior_rows
 from fitmat.studies import record
 from fitmat.studies.study import Study
 from fitmat.text import visible
-from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS, Posterior
+from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAIL_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS, Posterior
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -153,7 +153,7 @@ def _rendered(study: Study, pictures: "_Pictures") -> str:
         verdicts=VERDICTS,
         curves=_curve_pictures(study),
         residuals=(lambda: _plot().residual_figure(study, _drawn(study))) if study.full else None,
-        enough={"tau": ENOUGH_TAU, "ess": ENOUGH_ESS, "rhat": GOOD_RHAT},
+        enough={"tau": ENOUGH_TAU, "ess": ENOUGH_ESS, "tail_ess": ENOUGH_TAIL_ESS, "rhat": GOOD_RHAT},
         corners=[(p.fit.name, _corner(p)) for p in study.posteriors if study.full and _has_posterior(p)],
         **_match_parts(study.match, study.full),
         **_choice_parts(study.choice, study.full),

@@ -43,9 +43,10 @@ def to_dict(study: Study) -> dict[str, Any]:
 def _fit_dict(found: Findings) -> dict[str, Any]:
     posterior, fit, d = found.posterior, found.fit, found.posterior.diagnostics
     channels, check, opinion = len(fit.measurements.channels), found.check, found.second_opinion
-    diagnosed = {"ess_min": None, "rhat_max": None, "tau_max": None}
+    diagnosed = {"ess_min": None, "tail_ess_min": None, "rhat_max": None, "tau_max": None}
     if d is not None:
-        diagnosed = {"ess_min": d.ess.min(), "rhat_max": d.rhat.max(), "tau_max": d.tau.max()}
+        diagnosed = {"ess_min": d.ess.min(), "tail_ess_min": d.tail_ess.min()}
+        diagnosed |= {"rhat_max": d.rhat.max(), "tau_max": d.tau.max()}
         diagnosed |= {"acceptance": d.acceptance, "steps": d.steps, "burn_in": d.burn_in, "walkers": d.walkers}
         diagnosed |= {"seed": d.seed}
     return {

@@ -21,7 +21,8 @@ from fitmat.fitting.result import Fit
 from fitmat.uncertainty.checkpoint import Checkpoint, Saved, digest
 from fitmat.uncertainty.density import log_posterior, physical
 from fitmat.uncertainty.laplace import draws, independent_proposal, laplace
-from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAU, Diagnostics, Posterior, split_rhat
+from fitmat.uncertainty.mixing import split_rhat, tail_ess
+from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAIL_ESS, ENOUGH_TAU, Diagnostics, Posterior
 
 WALKERS = 40
 """Of the ensemble; four for each dimension where there are more than ten."""
@@ -53,7 +54,8 @@ def sample(
     The ensemble starts from Laplace draws. A step proposes for every walker either an independent draw from a t
     distribution around the Laplace approximation (60 %), or a differential-evolution (30 %) or snooker (10 %) move,
     which need no such approximation; all walkers are evaluated in one compiled call. It stops at 50 autocorrelation
-    times and 400 effective draws per parameter after a burn-in of 5 autocorrelation times, or at the cap.
+    times, 400 effective draws per parameter and 714 behind its limits after a burn-in of 5 autocorrelation times, or
+    at the cap.
 
     Args:
         fit: A fit with a finite optimum.
@@ -179,7 +181,11 @@ def _resumed(sampler: Any, saved: Saved) -> Any:
 def _steps_needed(sampler: Any) -> int:
     tau = sampler.get_autocorr_time(tol=0)
     worst = float(np.nanmax(tau)) if np.isfinite(tau).any() else float(sampler.iteration)
-    return int(np.ceil(worst * (5 + max(ENOUGH_TAU, ENOUGH_ESS / sampler.nwalkers)))) + 1
+    burn_in = 5.0 * worst
+    kept = sampler.get_chain(discard=int(min(np.ceil(burn_in), sampler.iteration // 2)))
+    behind = float(np.nan_to_num(tail_ess(kept), nan=np.inf).min())  # NaN where nothing moved, which R̂ says
+    needed = max(ENOUGH_TAU * worst, ENOUGH_ESS / sampler.nwalkers * worst, ENOUGH_TAIL_ESS / behind * len(kept))
+    return int(np.ceil(burn_in + needed)) + 1
 
 
 def _posterior(fit: Fit, sampler: Any, seed: int, interrupted: bool) -> Posterior:
@@ -194,6 +200,7 @@ def _posterior(fit: Fit, sampler: Any, seed: int, interrupted: bool) -> Posterio
     found = Diagnostics(
         tau=tau,
         ess=kept * walkers / tau,
+        tail_ess=tail_ess(chain),
         rhat=split_rhat(chain),
         acceptance=float(np.mean(sampler.acceptance_fraction)),
         steps=steps,

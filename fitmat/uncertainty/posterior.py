@@ -18,7 +18,6 @@ from fitmat.errors import OutputError
 from fitmat.extras import needed
 from fitmat.fitting.coordinates import channel_names
 from fitmat.fitting.result import Fit
-from fitmat.maths import normal
 from fitmat.models.parameters import Entry
 from fitmat.text import brief, html_table, text_table, with_error
 from fitmat.uncertainty.estimate import limits
@@ -39,7 +38,10 @@ ENOUGH_TAU = 50
 """A chain of this many autocorrelation times is long enough (emcee's documentation)."""
 
 ENOUGH_ESS = 400
-"""Independent draws per parameter that are enough for a 95 % interval (Vehtari et al. 2021)."""
+"""Independent draws per parameter that are enough for its mean (Vehtari et al. 2021)."""
+
+ENOUGH_TAIL_ESS = 714
+"""Independent draws behind each 95 % limit whose own standard error is then 0.1 sd, √(0.025 · 0.975/ESS)/φ(1.96)."""
 
 GOOD_RHAT = 1.05
 """Split-R̂ over walkers up to which the posterior counts as converged."""
@@ -56,6 +58,7 @@ class Diagnostics:
     Attributes:
         tau: Integrated autocorrelation time in steps.
         ess: Effective number of independent draws.
+        tail_ess: The same behind the 95 % limits (`mixing.tail_ess`).
         rhat: Split-R̂ over walkers.
         acceptance: Accepted fraction of proposals.
         steps: Steps per walker, burn-in included.
@@ -66,6 +69,7 @@ class Diagnostics:
 
     tau: np.ndarray
     ess: np.ndarray
+    tail_ess: np.ndarray
     rhat: np.ndarray
     acceptance: float
     steps: int
@@ -122,8 +126,8 @@ class Posterior:
         kept = d.steps - d.burn_in
         if not np.isfinite(d.tau).all() or kept < 10 * d.tau.max() or d.rhat.max() > 1.2:
             return "unusable"
-        enough = kept >= ENOUGH_TAU * d.tau.max() and d.ess.min() >= ENOUGH_ESS and d.rhat.max() <= GOOD_RHAT
-        return "reliable" if enough else "tentative"
+        enough = d.ess.min() >= ENOUGH_ESS and d.tail_ess.min() >= ENOUGH_TAIL_ESS and d.rhat.max() <= GOOD_RHAT
+        return "reliable" if enough and kept >= ENOUGH_TAU * d.tau.max() else "tentative"
 
     @property
     def exact(self) -> bool:
@@ -182,8 +186,10 @@ class Posterior:
         return pl.DataFrame({"chain": walker, "draw": step, **numbers, "discrepancy": s.ravel()})
 
     def description(self) -> dict[str, str]:
-        """What a file of the draws says of them: model, method, verdict, units; of chains also seed and burn-in."""
+        """What a file of the draws says of them: model, method, verdict, units; seed and burn-in; whether widened."""
         known = {"model": self.fit.name, "method": self.method, "verdict": self.verdict}
+        if self.fit.correlation.found:
+            known["widened"] = f"{self.fit.n_values} readings count as {self.fit.correlation.independent:.3g}"
         if self.diagnostics is not None:
             known |= {"seed": str(self.diagnostics.seed), "burn_in": str(self.diagnostics.burn_in)}
         units = {e.name: e.param.unit for e in self.fit.entries if e.name not in self.fit.held}
@@ -232,40 +238,3 @@ class Posterior:
     def _channels(self, entry: Entry, part: np.ndarray) -> list[tuple[str, np.ndarray]]:
         """The draws of a parameter channel by channel, each with its name."""
         return list(zip(channel_names(entry, self.fit.measurements.channels), np.moveaxis(part, -1, 0), strict=True))
-
-
-def split_rhat(chain: Float[np.ndarray, "steps walkers d"]) -> Float[np.ndarray, " d"]:
-    """Rank-normalised split-R̂, of the bulk or of the tails, whichever is larger; walkers count as chains.
-
-    Vehtari, Gelman, Simpson, Carpenter & Bürkner 2021, Bayesian Analysis 16, eqs. 1–4 and 14.
-
-    Args:
-        chain: Draws; NaN comes of fewer than 4 steps or 2 walkers, of a NaN among them, and where no walker moved.
-    """
-    steps, walkers, d = chain.shape
-    if steps < 4 or walkers < 2:
-        return np.full(d, np.nan)
-    halves = np.concatenate([chain[: steps // 2], chain[-(steps // 2) :]], axis=1)
-    bulk = _rhat(_normal_scores(halves))
-    tails = _rhat(_normal_scores(np.abs(halves - np.median(halves, axis=(0, 1)))))
-    return np.where(np.isnan(chain).any(axis=(0, 1)), np.nan, np.fmax(bulk, tails))
-
-
-def _normal_scores(x: Float[np.ndarray, "steps chains d"]) -> Float[np.ndarray, "steps chains d"]:
-    """Each parameter's values replaced by normal quantiles of their ranks, Φ⁻¹((r − 3/8)/(S + 1/4)) (eq. 14).
-
-    Equal values share the mean of their ranks.
-    """
-    found, size = np.empty(x.shape), x.shape[0] * x.shape[1]
-    for k in range(x.shape[2]):
-        _, place, count = np.unique(x[..., k], return_inverse=True, return_counts=True)
-        rank = np.cumsum(count) - (count - 1) / 2
-        found[..., k] = normal.quantile((rank - 3 / 8) / (size + 1 / 4))[place.reshape(x.shape[:2])]
-    return found
-
-
-def _rhat(x: Float[np.ndarray, "steps chains d"]) -> Float[np.ndarray, " d"]:
-    """√((N − 1)/N + B/(N W)) with the variances between and within chains (eqs. 1–4)."""
-    between = np.var(x.mean(axis=0), axis=0, ddof=1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.sqrt(between / np.var(x, axis=0, ddof=1).mean(axis=0) + 1.0 - 1.0 / len(x))

@@ -98,6 +98,7 @@ def test_a_right_model_keeps_its_intervals(right: Fit) -> None:
 def test_widened_draws_have_the_covariance_that_is_quoted(wrong: Fit) -> None:
     posterior = fm.laplace(wrong, seed=1, corrected=False)
     assert wrong.correlation.found
+    assert posterior.description()["widened"].startswith(f"{wrong.n_values} readings count as ")
     sd = np.sqrt(np.diagonal(wrong.covariance))
     assert (sd > 2.0 * np.sqrt(np.diagonal(wrong.likelihood_covariance))).any()
     np.testing.assert_allclose(posterior.values.std(axis=0) / sd, 1.0, atol=0.08)  # 2000 draws, and bounds

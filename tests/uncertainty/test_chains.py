@@ -20,7 +20,8 @@ from fitmat.fitting.result import Fit
 from fitmat.models.parameters import vector, with_vector
 from fitmat.uncertainty.chains import CHUNK, WALKERS
 from fitmat.uncertainty.density import log_posterior
-from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAU, GOOD_RHAT, Diagnostics, Posterior, split_rhat
+from fitmat.uncertainty.mixing import split_rhat, tail_ess
+from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAIL_ESS, ENOUGH_TAU, GOOD_RHAT, Diagnostics, Posterior
 
 QUANTILE = 0.15
 """In standard deviations: three Monte Carlo errors, 2.7/√ESS, of an outer quantile from about 1600 effective draws,
@@ -118,6 +119,7 @@ def test_a_finished_chain_is_reliable(sampled: Posterior) -> None:
     assert sampled.verdict == "reliable"
     assert d.steps - d.burn_in >= ENOUGH_TAU * d.tau.max()
     assert d.ess.min() >= ENOUGH_ESS
+    assert d.tail_ess.min() >= ENOUGH_TAIL_ESS
     assert d.rhat.max() <= GOOD_RHAT
     assert 0.2 < d.acceptance < 0.9
     assert sampled.chain is not None
@@ -137,6 +139,7 @@ def test_short_chains_are_said_to_be_short(fit: Fit) -> None:
 
 def diagnosed(sampled: Posterior, **changes: object) -> str:
     given: dict[str, object] = {"tau": np.full(5, 8.0), "ess": np.full(5, 4000.0), "rhat": np.full(5, 1.01)}
+    given["tail_ess"] = np.full(5, 4000.0)
     given |= {"acceptance": 0.5, "steps": 1040, "burn_in": 40, "walkers": 32, "seed": 1, **changes}
     return dataclasses.replace(sampled, diagnostics=Diagnostics(**given)).verdict  # pyright: ignore[reportArgumentType]
 
@@ -147,6 +150,7 @@ def test_verdicts_follow_their_thresholds(sampled: Posterior) -> None:
     assert diagnosed(sampled, tau=np.full(5, 101.0)) == "unusable"  # fewer than 10 τ
     assert diagnosed(sampled, tau=np.full(5, np.nan)) == "unusable"
     assert diagnosed(sampled, ess=np.full(5, 399.0)) == "tentative"
+    assert diagnosed(sampled, tail_ess=np.full(5, 713.0)) == "tentative"
     assert diagnosed(sampled, rhat=np.full(5, 1.06)) == "tentative"
     assert diagnosed(sampled, rhat=np.full(5, 1.21)) == "unusable"
 
@@ -231,6 +235,29 @@ def test_split_rhat_knows_good_chains_from_bad() -> None:
     assert split_rhat(chain + np.linspace(0, 2, 16)[:, None]).min() > 1.1  # walkers that disagree
     assert split_rhat(chain + np.linspace(0, 2, 500)[:, None, None]).min() > 1.1  # walkers that still drift
     assert np.isnan(split_rhat(np.zeros((500, 16, 1)))).all()  # stuck
+
+
+def test_limits_scatter_as_their_effective_draws_say() -> None:
+    """400 sets of AR(1) walks with ρ = 0.8: how far 2.5 % quantiles scatter, beside √(p (1 − p)/ESS)/φ(1.96)."""
+    rng, rho = np.random.default_rng(5), 0.8
+    x = np.zeros((300, 400, 8))
+    for k in range(1, 300):
+        x[k] = rho * x[k - 1] + np.sqrt(1 - rho**2) * rng.normal(size=x.shape[1:])
+    walks = x[60:].transpose(1, 0, 2)  # set, step, walker
+    limit = np.quantile(walks, 0.025, axis=(1, 2))
+    told = np.mean([tail_ess(one[..., None])[0] for one in walks])
+    assert limit.std() == pytest.approx(np.sqrt(0.025 * 0.975 / told) / 0.0584, rel=0.12)  # its own error is 4 %
+    assert told > 1.5 * walks[0].size * (1 - rho) / (1 + rho)  # a threshold is forgotten sooner than the value
+
+
+def test_walks_that_linger_in_a_tail_are_said_to() -> None:
+    """Independent draws but for one walker in forty that rests below all others' 2.5 % for half of the time."""
+    chain = np.random.default_rng(6).normal(size=(400, 40, 1))
+    free = tail_ess(chain)[0]
+    chain[:200, 0] = -3.0
+    assert free > 10_000
+    assert tail_ess(chain)[0] < 714
+    assert np.isnan(tail_ess(np.zeros((50, 8, 1)))).all()
 
 
 def test_thinning_spreads_over_the_run(sampled: Posterior) -> None:

@@ -9,8 +9,8 @@ from arviz_stats.base.array import array_stats
 from scipy import stats
 
 from fitmat.uncertainty import pareto
+from fitmat.uncertainty.mixing import split_rhat
 from fitmat.uncertainty.pareto import FEWEST_IN_TAIL, leave_one_out, smoothed
-from fitmat.uncertainty.posterior import split_rhat
 
 ROUNDING = 1e-10
 """The same formulas, summed in another order: of log weights, of k̂, of densities in nats."""
@@ -115,7 +115,7 @@ def test_neither_arviz_nor_scipy_is_loaded_to_weigh() -> None:
 import sys
 import numpy as np
 from fitmat.uncertainty.pareto import leave_one_out, smoothed
-from fitmat.uncertainty.posterior import split_rhat
+from fitmat.uncertainty.mixing import split_rhat
 x = np.random.default_rng(0).normal(size=(300, 4, 2))
 smoothed(x[:, 0, 0]), leave_one_out(x[:, 0]), split_rhat(x)
 assert not {"arviz_stats", "scipy"} & set(sys.modules)
