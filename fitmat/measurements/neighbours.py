@@ -45,6 +45,17 @@ def curves(m: Measurements, channel: int) -> tuple[np.ndarray, np.ndarray, np.nd
     return rows[order], curve[order], angle[order]
 
 
+def spacing(m: Measurements) -> float:
+    """Median angle between neighbours on a curve, radians; NaN where there is no curve."""
+    gaps = []
+    for k in range(m.valid.shape[1]):
+        _, curve, angle = curves(m, k)
+        apart = np.diff(angle)
+        gaps.append(apart[(np.diff(curve) == 0) & (apart > _TOGETHER)])
+    every = np.concatenate(gaps)
+    return float(np.median(every)) if every.size else float("nan")
+
+
 def leave_one_out(m: Measurements) -> Float[np.ndarray, "3 n c"]:
     """Per value: the level predicted without it, its error, and the variance of that error in units of σ².
 

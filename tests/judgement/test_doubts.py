@@ -53,6 +53,18 @@ def test_a_sigma_that_is_off_by_a_thousand_is_doubted(made: fm.Measurements, fac
     assert "correct its unit" in str(found)
 
 
+def test_noise_from_neighbours_beyond_the_lobe_is_called_a_bound() -> None:
+    """Steps of 10° beside lobes of alpha 0.1 and 0.5."""
+    angles = np.deg2rad(np.linspace(5.0, 75.0, 8)), np.deg2rad(np.arange(-80.0, 81.0, 10.0))
+    for alpha in (0.1, 0.5):
+        truth = fm.model("lambert+ggx", kd=0.2, alpha=alpha)
+        m = fm.simulate(truth, *angles, relative_noise=0.02, absolute_noise=1e-3, seed=1)
+        words = str(find_doubts(fm.fit(dataclasses.replace(m, sigma=None), "lambert+ggx")))
+        told = "The noise was estimated from neighbours 10° apart beside a lobe" in words
+        assert told == (alpha == 0.1)
+        assert ("upper bound" in words) == told
+
+
 def test_identical_values_are_named(made: fm.Measurements) -> None:
     found = find_doubts(fm.fit(changed(made, np.full_like(made.value, 0.3)), "lambert+ggx"))
     assert found.inadequate
