@@ -19,6 +19,10 @@ beyond the half, it does not."""
 DEEP = 0.1
 """Logarithms go this far below zero, as a fraction of the largest value; a floor that was subtracted twice does not."""
 
+LEVEL, SHALLOW, SOME = 0.8, 0.02, 0.25
+"""Of negative values that are a level, not noise about zero: the upper quartile is so near the median (0.47 for noise),
+which lies so far below zero as a fraction of the largest value; and they are this share of all."""
+
 AWAY, BACK, UPRIGHT = np.deg2rad(30.0), np.deg2rad(15.0), np.deg2rad(75.0)
 """Reflectance factors are judged this far from the mirror direction and from the light, up to this zenith angle."""
 
@@ -63,15 +67,23 @@ def with_doubts(m: Measurements) -> Measurements:
 
 def _refuse_logarithms(value: np.ndarray, where: str) -> None:
     share = np.count_nonzero(value < 0) / max(len(value), 1)
-    if len(value) < 3 or share < max(MOST_NEGATIVE, 0.5 + 1.5 / np.sqrt(len(value)), 0.5):
-        return
-    if -np.quantile(value, 0.05) < DEEP * value.max():
+    mostly = share >= max(MOST_NEGATIVE, 0.5 + 1.5 / np.sqrt(len(value) or 1))
+    deep = mostly and -np.quantile(value, 0.05) >= DEEP * value.max()
+    if len(value) < 3 or not (deep or _is_level(value, share)):
         return
     got = f"{share:.0%} of the values are negative, expected reflected light"
     remedy = (
         "If they are logarithms, say which: --scale db, --scale log10 or --scale ln; if they are noise, --scale linear"
     )
     raise ReadError(f"{where}: {got}. {remedy} (scale=).")
+
+
+def _is_level(value: np.ndarray, share: float) -> bool:
+    """Whether the negative values, if there are many, stand about a level below zero, as a dull surface in dB does."""
+    if share < SOME or np.count_nonzero(value < 0) < 3:
+        return False
+    upper, middle = np.quantile(value[value < 0], [0.75, 0.5])
+    return bool(upper / middle >= LEVEL and -middle >= SHALLOW * value.max())
 
 
 def _diffuse(m: Measurements) -> np.ndarray:

@@ -69,6 +69,29 @@ def test_noise_about_zero_and_a_floor_subtracted_twice_are_no_logarithms():
     assert fm.read(curve(brdf=floor)).n_valid == len(BRDF)
 
 
+def test_decibels_of_a_bright_surface_are_asked_about():
+    """A reflectance factor of 0.79 is −1 dB; half of the values lie in the lobe, and above 0."""
+    angle = np.arange(-70.0, 71.0, 2.5)
+    rng = np.random.default_rng(3)
+    factor = (0.79 + 20 * np.exp(-(((angle - 30) / 25) ** 2))) * (1 + 0.01 * rng.normal(size=len(angle)))
+    table = {"theta_i": np.full(len(angle), 30.0), "theta_o": angle, "brf": 10 * np.log10(factor)}
+    assert np.mean(table["brf"] < 0) < 0.4
+    with pytest.raises(ReadError, match=r"of the values are negative, .*--scale db"):
+        fm.read(table)
+    np.testing.assert_allclose(np.pi * fm.read(table, scale="db").value[:, 0], factor, rtol=1e-12)
+
+
+def test_a_dark_signal_subtracted_twice_under_a_peak_is_no_logarithm():
+    """Of 1 % of the peak, half of the rows; and noise about zero of any size."""
+    angle = np.arange(-70.0, 71.0, 2.5)
+    table = {"theta_i": np.full(len(angle), 30.0), "theta_o": angle}
+    peak = np.exp(-(((angle - 30) / 10) ** 2))
+    assert fm.read(table | {"brdf": peak - 0.01}).n_valid == len(angle)
+    for seed in range(30):
+        noise = np.random.default_rng(seed).normal(size=len(angle))
+        assert fm.read(table | {"brdf": 3 * peak + noise}).n_valid == len(angle)
+
+
 def test_what_is_confirmed_is_not_asked_about():
     measured = fm.read(curve(brdf=np.log10(BRDF)), scale="linear")
     assert measured.value[:, 0] == pytest.approx(np.log10(BRDF), rel=EXACT)
