@@ -4,6 +4,8 @@ Gives starts; refines none of them.
 """
 
 import itertools
+import math
+from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -16,6 +18,9 @@ from fitmat.models.values import SMALL, slices, values
 
 MAX_ROWS = SMALL[1]
 """The grid looks at no more rows than this, evenly spread over the file."""
+
+MOST_NODES = 1 << 13
+"""Nodes of a grid that are looked at; three lobes have fewer, seven have 10⁸."""
 
 MOST_NUMBERS = 4_000_000
 """Values of the model that are held at a time."""
@@ -43,7 +48,7 @@ def starting_points(
         Physical parameter vectors; fewer than `count` rows where the grid is smaller.
     """
     free = [e for e in entries(model) if e.name not in held]
-    nodes = np.array(_nodes(model, [e for e in free if not e.param.weight], held), float)
+    nodes = _nodes(model, [e for e in free if not e.param.weight], held)
     places = np.array([k for e in free if e.param.weight for k in range(e.place.start, e.place.stop)], int)
     thinned = data.every(-(-data.x.shape[0] // MAX_ROWS))
     per_node = (2 + len(places)) * thinned.x.size
@@ -55,18 +60,25 @@ def starting_points(
     return solved[np.argsort(np.nan_to_num(cost, nan=np.inf), kind="stable")[:count]]
 
 
-def _nodes(model: AbstractBRDF, shapes: list[Entry], held: dict[str, np.ndarray]) -> list[np.ndarray]:
-    base = np.array(vector(model))
+def _nodes(model: AbstractBRDF, shapes: list[Entry], held: dict[str, np.ndarray]) -> Float[np.ndarray, "k p"]:
+    base = np.array(vector(model), float)
     for entry in entries(model):
         if entry.name in held:
             base[entry.place] = held[entry.name]
-    result = []
-    for chosen in itertools.product(*(e.param.starts for e in shapes)):
-        node = base.copy()
-        for entry, value in zip(shapes, chosen, strict=True):
-            node[entry.place] = value
-        result.append(node)
-    return result
+    axes = [e.param.starts for e in shapes]
+    chosen = list(itertools.product(*axes)) if math.prod(map(len, axes)) <= MOST_NODES else _spread_over(axes)
+    nodes = np.tile(base, (len(chosen), 1))
+    for column, entry in enumerate(shapes):
+        nodes[:, entry.place] = np.array([node[column] for node in chosen], float)[:, None]
+    return nodes
+
+
+def _spread_over(axes: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
+    """`MOST_NODES` nodes of a larger grid, even along each axis and between any two (Sobol 1967)."""
+    from scipy.stats import qmc  # which small grids, those of all usual models, do without
+
+    places = qmc.Sobol(len(axes), scramble=False).random(MOST_NODES)
+    return [tuple(axis[int(u * len(axis))] for axis, u in zip(axes, row, strict=True)) for row in places.tolist()]
 
 
 def _solve_nodes(

@@ -1,5 +1,8 @@
 """Where a fit begins: exact non-negative weights against scipy, and a grid that comes near the truth."""
 
+import itertools
+import math
+
 import numpy as np
 import pytest
 from hypothesis import example, given
@@ -8,6 +11,7 @@ from hypothesis.extra import numpy as hnp
 from scipy.optimize import nnls
 
 import fitmat as fm
+from fitmat.fitting import starts
 from fitmat.fitting.likelihood import Data, prepare
 from fitmat.fitting.starts import nonnegative, starting_points
 from fitmat.measurements.noise import measured_noise
@@ -45,6 +49,30 @@ def test_weights_are_scipys_where_they_are_unique(seed: int) -> None:
     rng = np.random.default_rng(seed)
     a, b = rng.normal(size=(40, 3)), rng.normal(size=40)
     np.testing.assert_allclose(nonnegative(a.T @ a, a.T @ b), nnls(a, b)[0], rtol=WEIGHTS, atol=WEIGHTS)
+
+
+MANY = "lambert+phong+blinn-phong+ggx+beckmann+ward+ashikhmin-shirley"
+
+
+def test_a_small_grid_is_looked_at_whole() -> None:
+    model = fm.model("lambert+ggx+phong")
+    shapes = [e for e in entries(model) if not e.param.weight]
+    nodes = starts._nodes(model, shapes, {})
+    expected = itertools.product(*(e.param.starts for e in shapes))
+    assert nodes[:, [e.place.start for e in shapes]].tolist() == [list(node) for node in expected]
+
+
+def test_of_a_grid_of_many_lobes_an_even_part_is_looked_at() -> None:
+    """180 million nodes took gigabytes. Each pair of starts of two parameters has its share, to a tenth."""
+    model = fm.model(MANY)
+    shapes = [e for e in entries(model) if not e.param.weight]
+    nodes = starts._nodes(model, shapes, {})
+    assert len(nodes) == starts.MOST_NODES < math.prod(len(e.param.starts) for e in shapes) / 10_000
+    for one, other in itertools.combinations(shapes, 2):
+        pairs = nodes[:, [one.place.start, other.place.start]]
+        found, count = np.unique(pairs, axis=0, return_counts=True)
+        assert len(found) == len(one.param.starts) * len(other.param.starts)
+        np.testing.assert_allclose(count, len(nodes) / len(found), rtol=0.1)
 
 
 @pytest.fixture(scope="module")
