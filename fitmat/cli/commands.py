@@ -121,13 +121,13 @@ def fit(
         process.set_up()
         from fitmat.maths import programs
 
-        programs.load_ahead()
-        from fitmat.cli import fit
+        with programs.ahead("fit"):
+            from fitmat.cli import fit
 
-        told = {"models": models, "loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
-        told |= fit.known(fix or [], prior or [])
-        told |= {"sampling": not no_mcmc, "second_opinion": check_posterior, "full": full}
-        done = fit.write_report(files, out, reading | {"instrument": instrument}, told, watch, force=force)
+            told = {"models": models, "loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
+            told |= fit.known(fix or [], prior or [])
+            told |= {"sampling": not no_mcmc, "second_opinion": check_posterior, "full": full}
+            done = fit.write_report(files, out, reading | {"instrument": instrument}, told, watch, force=force)
     done.tell(as_json=json_)
     if not done.converged:
         raise typer.Exit(NOT_CONVERGED)
@@ -188,13 +188,16 @@ def check(
 ) -> None:
     """Describe a file before any fit: what was measured where, how consistently, and what can be learnt from it."""
     process.set_up()
-    from fitmat.cli import check
-    from fitmat.judgement.examination.examining import examine
-    from fitmat.measurements.reader import read
-    from fitmat.reports.pictures import refuse_picture
+    from fitmat.maths import programs
 
-    refuse_picture(plot, force=force)
-    found = examine(read(files, **reading, instrument=instrument))
+    with programs.ahead("check"):
+        from fitmat.cli import check
+        from fitmat.judgement.examination.examining import examine
+        from fitmat.measurements.reader import read
+        from fitmat.reports.pictures import refuse_picture
+
+        refuse_picture(plot, force=force)
+        found = examine(read(files, **reading, instrument=instrument))
     process.say(check.as_json(found) if json_ else str(found))
     if plot is not None:
         check.draw(found, plot)
@@ -266,14 +269,15 @@ def design(
 
     with session.watch() as watch:
         process.set_up()
-        from fitmat.cli import design
         from fitmat.maths import programs
-        from fitmat.measurements.reader import read
-        from fitmat.reports.pictures import refuse_picture
 
-        refuse_picture(plot, force=force)
-        measurements = read(files, **reading, instrument=instrument)
-        with programs.announced(watch.compiling):
+        with programs.ahead("design"), programs.announced(watch.compiling):
+            from fitmat.cli import design
+            from fitmat.measurements.reader import read
+            from fitmat.reports.pictures import refuse_picture
+
+            refuse_picture(plot, force=force)
+            measurements = read(files, **reading, instrument=instrument)
             posteriors = design.fitted(measurements, models, fix or [], seed, watch)
             watch("looking for the next angles", 0, 0)
             found = design.propose(posteriors, for_, kind=kind, count=count)

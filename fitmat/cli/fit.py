@@ -91,7 +91,6 @@ def write_report(
         found = study(measurements, resume=files.resumed(target), progress=watch, **told)
         watch("writing the report", 0, 0)
         missing = page.write(written, found)
-    programs.remember()
     if told["sampling"]:
         forget(files.resumed(target))
     return Report(target, found, missing)

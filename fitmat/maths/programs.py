@@ -12,6 +12,7 @@ import re
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import jax
@@ -20,8 +21,8 @@ from jax.core import Tracer
 
 from fitmat.maths import defects, program_files, program_names
 
-LAST = "last-run"
-"""File that names the programs of the last run."""
+LAST = "last-{}"
+"""File that names the programs of the last run of a command."""
 
 MOST_AHEAD = 16
 """Programs that are loaded ahead."""
@@ -226,13 +227,27 @@ def _calling(exported: Any, name: str) -> Callable[..., Any]:
     return call
 
 
-def load_ahead() -> None:
-    """Load, in a thread, what the last run used, while this one has other things to do; `remember` ends a run."""
+@contextlib.contextmanager
+def ahead(command: str) -> Iterator[None]:
+    """Load, in a thread, what the last run of a command used; note what this one uses where it ends well.
+
+    Args:
+        command: A word.
+    """
     place = program_files.folder()
-    if place is None:
-        return
+    if place is not None:
+        _load_ahead(place / LAST.format(command))
+    yield
+    if place is not None and _USED:
+        draft = place / f".{LAST.format(command)}.{os.getpid()}"
+        with contextlib.suppress(OSError):
+            draft.write_text("\n".join(dict.fromkeys(_USED)), encoding="ascii")
+            os.replace(draft, place / LAST.format(command))
+
+
+def _load_ahead(noted: Path) -> None:
     try:
-        lines = (place / LAST).read_text(encoding="ascii", errors="replace").splitlines()
+        lines = noted.read_text(encoding="ascii", errors="replace").splitlines()
     except OSError:
         return
     known = [line for line in lines[:MOST_AHEAD] if _NOTED.fullmatch(line)]
@@ -253,13 +268,3 @@ def _loaded(name: str, kind: str) -> Callable[..., Any] | None:
     with contextlib.suppress(Exception):
         return _compiled(_calling(exported, name), shapes, kind == _KINDS[True])
     return None
-
-
-def remember() -> None:
-    """Note which programs this run used, for `load_ahead` of the next."""
-    place = program_files.folder()
-    if place is not None and _USED:
-        draft = place / f".{LAST}.{os.getpid()}"
-        with contextlib.suppress(OSError):
-            draft.write_text("\n".join(dict.fromkeys(_USED)), encoding="ascii")
-            os.replace(draft, place / LAST)

@@ -443,6 +443,32 @@ def test_what_is_kept_is_counted_and_removed(place: Path, given: Arguments) -> N
     assert_right(given)
 
 
+def test_what_a_command_used_is_loaded_ahead(
+    place: Path, given: Arguments, traced: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of that command only, and only where it ended well; what is noted there may be anything."""
+    used: list[str] = []
+    early: dict[str, Any] = {}
+    monkeypatch.setattr(programs, "_USED", used)
+    monkeypatch.setattr(programs, "_AHEAD", early)
+    with programs.ahead("fit"):
+        assert_right(given)
+    with pytest.raises(ZeroDivisionError), programs.ahead("check"):
+        raise ZeroDivisionError
+    used.clear()
+    with programs.ahead("check"):
+        assert early == {}
+    with programs.ahead("fit"):
+        (loading,) = early.values()
+        assert loading.result() is not None
+        assert_right(given)
+        assert early == {}
+    (place / "last-fit").write_bytes(b"\x00\xff ../../evil-0123 plain\n" * 40)
+    with programs.ahead("fit"):
+        assert_right(given)
+    assert len(traced) == 1
+
+
 def test_clear_lets_go_of_what_is_loaded(place: Path, given: Arguments, traced: list[str]) -> None:
     one = fresh()
     one(*given)
