@@ -185,7 +185,7 @@ class Curve(eqx.Module):
         return chebyshev(self.coefficients, 2.0 * jnp.sqrt(jnp.maximum(cos, _ROOT_FLOOR)) - 1.0)
 
 
-def chebyshev(coefficients: Float[Array, " k *n"], x: Float[Array, " *n"]) -> Float[Array, " *n"]:
+def chebyshev(coefficients: Float[Any, " k *n"], x: Float[Any, " *n"]) -> Float[Any, " *n"]:
     """Σ a_k T_k(x) by Clenshaw's recurrence; where the a_k are arrays, of each of their elements at one x."""
     one = two = 0.0 * x * coefficients[0]
     for k in range(len(coefficients) - 1, 0, -1):

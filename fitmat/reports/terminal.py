@@ -67,8 +67,8 @@ def _remark(out: Console, found: Findings) -> None:
         _say(out, ("interrupted", "yellow"), ": sampling was stopped; what was done is kept.")
     if against.words:
         _say(out, ("in doubt" if against.inadequate else "note", "yellow"), f": {against}")
-    if found.scope:
-        _say(out, found.scope)
+    for words in filter(None, (found.scope, found.several_facets)):
+        _say(out, words)
     for said in (found.identifiability, found.second_opinion):
         if said is not None:
             _say(out, said.words)

@@ -17,6 +17,7 @@ from fitmat.judgement.identifiability.verdicts import Identifiability
 from fitmat.judgement.prediction import Section, standardised_residuals
 from fitmat.judgement.predictive_check import PredictiveCheck
 from fitmat.judgement.scope import describe_scope
+from fitmat.judgement.several_facets import left_out
 from fitmat.studies.curves import Curve, predict_curves
 from fitmat.text import brief
 from fitmat.uncertainty.posterior import Posterior
@@ -51,6 +52,7 @@ class Findings:
         derived: What follows from them.
         doubts: What speaks against the intervals.
         scope: What the intervals are about, as sentences.
+        several_facets: How much light single scattering leaves out, in a sentence.
         metrics: Name → distance from the measurements.
         priors: Parameter → what was believed of it before, as text, one for each channel.
         learnt: What the data added, for each fitted parameter.
@@ -66,6 +68,7 @@ class Findings:
     derived: tuple[Quantity, ...]
     doubts: Doubts
     scope: str
+    several_facets: str
     metrics: Mapping[str, float | None]
     priors: Mapping[str, tuple[str, ...]]
     learnt: tuple[Learnt, ...]
@@ -110,6 +113,7 @@ def find(
         derived=tuple(derived(posterior, fitted)),
         doubts=find_doubts(fit),
         scope=describe_scope(fit),
+        several_facets=left_out(fit),
         metrics=fit_metrics(fit),
         priors=priors.words(fit.model, fit.data.prior),
         learnt=_learnt(posterior),

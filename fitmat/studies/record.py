@@ -57,6 +57,7 @@ def _fit_dict(found: Findings) -> dict[str, Any]:
         "doubts": list(found.doubts.words),
         "intervals_hold": found.doubts.intervals_hold,
         "scope": found.scope,
+        "several_facets": found.several_facets,
         "readings": {"fitted": fit.n_values, "independent": fit.correlation.independent},
         "not_determined": [q.name for q in found.parameters if q.remark == UNDETERMINED],
         "n_starts": fit.n_starts,

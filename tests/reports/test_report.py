@@ -206,6 +206,10 @@ def test_report_makes_every_file(studied, tmp_path):
     draws, posterior = pl.read_parquet(tmp_path / names[2]), studied.posteriors[1]
     assert draws.columns[:4] == ["chain", "draw", "kd r", "kd g"]
     np.testing.assert_array_equal(draws["alpha"].to_numpy(), posterior.values[:, -2])
+    said = studied.findings[1].several_facets
+    assert said.startswith("ggx counts light that meets one facet")
+    assert said in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert json.loads((tmp_path / "fit.json").read_text(encoding="utf-8"))["fits"][1]["several_facets"] == said
 
 
 PICTURES: dict[str, list[str]] = {

@@ -5,13 +5,13 @@ Averages over the hemisphere follow from the same polynomials. What the facets a
 
 import functools
 from pathlib import Path
+from typing import Any
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from fitmat._types import Scalar
+from fitmat.maths.arrays import library
 from fitmat.maths.quadrature import chebyshev, gauss
 from fitmat.models.terms.distributions import AbstractDistribution, Masking
 
@@ -42,32 +42,33 @@ class Missing(eqx.Module):
         alpha: Slope parameter.
     """
 
-    coefficients: Float[Array, " k"]
-    alpha: Scalar
+    coefficients: Float[Any, " k"]
+    alpha: Float[Any, ""]
 
-    def __call__(self, cos: Scalar | Float[Array, " n"]) -> Array:
+    def __call__(self, cos: Float[Any, " *n"]) -> Float[Any, " *n"]:
         """1 − E at cosines in [0, 1], above 0; off by at most `ERROR`."""
-        c = jnp.maximum(cos, 0.0)
+        xp = library(cos, self.alpha, self.coefficients)
+        c = xp.maximum(cos, 0.0)
         u = c * (1.0 + SCALE * self.alpha) / (c + SCALE * self.alpha)
         found = chebyshev(self.coefficients, 2.0 * u - 1.0)
-        return 0.5 * (found + jnp.sqrt(found**2 + SMALLEST**2))
+        return 0.5 * (found + xp.sqrt(found**2 + SMALLEST**2))
 
-    def average(self) -> Scalar:
+    def average(self) -> Float[Any, ""]:
         """2∫ (1 − E(c)) c dc, of light that comes evenly from the hemisphere; Gauss in √c."""
-        return jnp.asarray(_SHARES) @ self(jnp.asarray(_COSINES))
+        return _SHARES @ self(_COSINES)
 
 
-def missing(distribution: AbstractDistribution, masking: Masking, alpha: Scalar) -> Missing:
+def missing(distribution: AbstractDistribution, masking: Masking, alpha: Float[Any, ""]) -> Missing:
     """What a lobe D G/(4 c_i c_o) with F = 1 loses; a polynomial in alpha, so that value and slope belong together.
 
     Args:
         distribution: GGX or Beckmann.
         masking: As `distributions.visibility`.
-        alpha: Slope parameter, 1e-4 to 1.
+        alpha: Slope parameter, 1e-4 to 1; where it is a plain number, NumPy computes.
     """
     table = _tables()[f"{distribution.label}-{masking}"]
     x = 2.0 * (alpha - LEAST_ALPHA) / (1.0 - LEAST_ALPHA) - 1.0
-    return Missing(chebyshev(jnp.asarray(table.T), x), alpha)
+    return Missing(chebyshev(table.T, x), alpha)
 
 
 @functools.cache

@@ -133,7 +133,7 @@ class White(AbstractFresnel):
 
     def __call__(self, cos_d: Scalar) -> Spectrum:
         """1."""
-        return jnp.ones_like(cos_d)
+        return library(cos_d).ones_like(cos_d)
 
     def normal_reflectance(self) -> Spectrum:
         """1."""
@@ -196,12 +196,14 @@ def hoffman(cos_d: Numbers | float, f0: Numbers, f82: Numbers) -> Numbers:
     return xp.clip(schlick(cos_d, f0) - a * cos_d * (1.0 - cos_d) ** 6, 0.0, 1.0)
 
 
-def average(fresnel: AbstractFresnel) -> Spectrum:
+def average(fresnel: AbstractFresnel) -> Any:
     """F_avg = 2∫₀¹ F(c) c dc, the reflectance under uniform diffuse light, one value per channel.
 
     Gauss–Legendre in the angle, 32 nodes: to 1e-12 for |η + iκ| < 10, to 3e-8 up to 50; where total reflection makes
     F kink (η < 1, κ → 0) to 0.01 only: take `average_inside` there.
     """
+    if library(*jax.tree.leaves(fresnel)) is np:
+        return np.tensordot(_AVERAGE, np.stack([np.asarray(fresnel(cos)) for cos in _COSINES]), 1)
     return jnp.tensordot(_AVERAGE, jax.vmap(fresnel)(jnp.asarray(_COSINES)), 1)
 
 
