@@ -43,7 +43,7 @@ class Candidate:
     Attributes:
         posterior: Of its fit.
         evidence: By leaving out single values; None where there are too many.
-        behind: By how much its elpd is below the best; 0 for the best.
+        behind: By how much its elpd is below the best; 0 for the best, NaN where it has none.
         behind_se: Standard error of that difference.
         left_out: Errors of whole incidences that were left out; None where there is only one.
         broken: Laws that it breaks, in words.
@@ -71,6 +71,11 @@ class Candidate:
         return self.posterior.fit
 
     @property
+    def weighed(self) -> bool:
+        """Whether there is a number by which it stands among the others."""
+        return bool(np.isfinite(self.behind))
+
+    @property
     def clearly_behind(self) -> bool:
         """Whether the data prefer the best by more than chance."""
         return self.behind > max(SMALL, SURE * self.behind_se)
@@ -78,7 +83,7 @@ class Candidate:
     @property
     def reliable(self) -> bool:
         """Whether its elpd can be relied on."""
-        return self.evidence is not None and self.evidence.bad <= FEW_BAD and self.posterior.exact
+        return self.weighed and self.evidence is not None and self.evidence.bad <= FEW_BAD and self.posterior.exact
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -86,7 +91,7 @@ class Choice:
     """Several models of the same measurements, the best first.
 
     Attributes:
-        candidates: By elpd where there is one, else by AICc.
+        candidates: By elpd where any has one, else by AICc; those without such a number are not weighed and come last.
     """
 
     candidates: tuple[Candidate, ...]
@@ -101,7 +106,7 @@ class Choice:
     @property
     def equals(self) -> tuple[Candidate, ...]:
         """The best and whatever is not clearly behind it."""
-        return tuple(c for c in self.candidates if c is self.best or not c.clearly_behind)
+        return tuple(c for c in self.candidates if c is self.best or (c.weighed and not c.clearly_behind))
 
     @property
     def verdict(self) -> str:
@@ -125,6 +130,8 @@ class Choice:
         if self.best.doubts:
             sentences.append(f"Of {self.best.name}: {'; '.join(self.best.doubts)}.")
         shaky = [c.name for c in self.equals if c.evidence is not None and not c.reliable]
+        if lost := [c.name for c in self.candidates if not c.weighed]:
+            sentences.append(f"Not weighed: {', '.join(lost)}, of which what it predicts is not a number.")
         if shaky:
             sentences.append(
                 f"The comparison is rough for {', '.join(shaky)}: {'its' if len(shaky) == 1 else 'their'} draws do not "
@@ -136,6 +143,8 @@ class Choice:
         equals, rest = self.equals, [c for c in self.candidates if c.clearly_behind]
         if len(self.candidates) == 1:
             return f"{self.best.name} is the only model that was tried."
+        if len(equals) == 1 and not rest:
+            return "No model could be weighed." if not self.best.weighed else f"Only {self.best.name} could be weighed."
         by = "elpd" if self.best.evidence is not None else "half of AICc"
         if len(equals) > 1:
             names = [c.name for c in equals]
@@ -155,9 +164,9 @@ class Choice:
                 c.name,
                 f"{c.fit.aicc:.1f}",
                 f"{c.fit.bic:.1f}",
-                "" if c.evidence is None else f"{c.evidence.elpd:.1f} ± {c.evidence.se:.1f}",
-                "0" if c is self.best else f"{-c.behind:.1f} ± {c.behind_se:.1f}",
-                "" if c.evidence is None else f"{c.evidence.p_loo:.1f}",
+                "" if c.evidence is None or not c.weighed else f"{c.evidence.elpd:.1f} ± {c.evidence.se:.1f}",
+                "not weighed" if not c.weighed else "0" if c is self.best else f"{-c.behind:.1f} ± {c.behind_se:.1f}",
+                "" if c.evidence is None or not c.weighed else f"{c.evidence.p_loo:.1f}",
                 "" if c.left_out is None else f"{c.left_out.error:.3g}",
                 "" if c.left_out is None else f"{c.left_out.surprise:.2g}",
                 "; ".join((*c.broken, *c.doubts)),
@@ -235,13 +244,18 @@ def choose(posteriors: Sequence[Posterior], *, predicting: bool = True, singly: 
         weighed = pool.map(lambda p: weigh(p) if singly else None, usable)
         left = pool.map(lambda p: leave_incidences_out(p.fit) if predicting else None, usable)
         found, unseen = list(weighed), list(left)
-    scores = [-0.5 * p.fit.aicc if e is None else e.elpd for p, e in zip(usable, found, strict=True)]
-    best = int(np.argmax(scores))
+    scores = [np.nan if e is None else e.elpd for e in found]
+    if not np.isfinite(scores).any():
+        scores = [-0.5 * p.fit.aicc for p in usable]
+    scores = np.where(np.isfinite(scores), scores, np.nan)
+    best = int(np.argmax(np.nan_to_num(scores, nan=-np.inf)))
     candidates = []
     for posterior, proof, out, score in zip(usable, found, unseen, scores, strict=True):
         fit, top = posterior.fit, found[best]
-        apart = np.zeros(1) if proof is None or top is None else top.pointwise - proof.pointwise
+        apart = np.zeros(1)
+        if proof is not None and top is not None and np.isfinite(score):
+            apart = top.pointwise - proof.pointwise
         error = float(np.sqrt(len(apart)) * apart.std())
         against = broken_laws(fit), doubts(fit)
-        candidates.append(Candidate(posterior, proof, scores[best] - score, error, out, *against))
-    return Choice(tuple(sorted(candidates, key=lambda c: c.behind)))
+        candidates.append(Candidate(posterior, proof, float(scores[best] - score), error, out, *against))
+    return Choice(tuple(sorted(candidates, key=lambda c: (not c.weighed, c.behind))))

@@ -171,6 +171,44 @@ def test_a_difference_counts_from_four_on_and_beyond_two_errors(rough: Choice) -
     assert not candidate(rough, 4.1, 2.1).clearly_behind
 
 
+def weighed_as(monkeypatch: pytest.MonkeyPatch, rough: Choice, elpd: dict[str, float | None]) -> Choice:
+    """The same posteriors, with these elpd; None for a candidate without evidence."""
+
+    def weigh(posterior: Posterior) -> Evidence | None:
+        known, given = rough.best.evidence, elpd[posterior.fit.name]
+        assert known is not None
+        pointwise = np.full(60, np.nan if given is None else given / 60)
+        return None if given is None else dataclasses.replace(known, elpd=given, pointwise=pointwise)
+
+    monkeypatch.setattr("fitmat.judgement.choice.weigh", weigh)
+    return fm.choose([c.posterior for c in reversed(rough.candidates)], predicting=False)
+
+
+@pytest.mark.parametrize("lost", [np.nan, np.inf, -np.inf, None])
+def test_a_candidate_without_a_number_is_never_first(
+    rough: Choice, monkeypatch: pytest.MonkeyPatch, lost: float | None
+) -> None:
+    """NaN is no maximum, and half of an AICc (about 100 here) stands on another scale than an elpd of −500."""
+    found = weighed_as(monkeypatch, rough, {"lambert": lost, "oren-nayar": -500.0})
+    assert [c.name for c in found.candidates] == ["oren-nayar", "lambert"]
+    assert [c.weighed for c in found.candidates] == [True, False]
+    assert found.equals == (found.best,)
+    assert found.verdict.startswith(
+        "Only oren-nayar could be weighed. Not weighed: lambert, of which what it predicts "
+    )
+    assert "not weighed" in str(found)
+    assert "nan" not in str(found)
+    assert not found.candidates[1].reliable
+
+
+def test_where_nothing_is_a_number_aicc_decides(rough: Choice, monkeypatch: pytest.MonkeyPatch) -> None:
+    for lost in (np.nan, None):
+        found = weighed_as(monkeypatch, rough, {"lambert": lost, "oren-nayar": lost})
+        assert [c.name for c in found.candidates] == ["oren-nayar", "lambert"]
+        behind = (found.candidates[1].fit.aicc - found.best.fit.aicc) / 2
+        assert found.candidates[1].behind == pytest.approx(behind, rel=1e-12)
+
+
 def test_what_speaks_against_the_best_is_said(rough: Choice) -> None:
     impossible = candidate(rough, 0.0, 0.0, broken=("is not reciprocal",), doubts=("kd at its upper bound",))
     lawful = rough.candidates[1]
