@@ -14,8 +14,8 @@ RANK = 160
 LEFT_OVER = 1e-3
 """Mean of the diagonal of K that the factor may leave over."""
 
-FEWEST = 6
-"""Values beyond the parameters from which on a process can be told from chance."""
+FEWEST = 20
+"""Values beyond the parameters from which on a process can be told from chance: of twelve readings never was."""
 
 RATIOS = np.concatenate([[0.0], np.logspace(-4.0, 6.0, 121)])
 """τ²/η² that are tried."""

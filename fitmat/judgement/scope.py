@@ -17,6 +17,11 @@ def describe_scope(fit: Fit) -> str:
     low, high = np.rad2deg(incidence_range(np.asarray(data.wi), np.any(np.greater(data.weight, 0.0), axis=1)))
     over = f"{low:.3g}°" if high - low < 0.05 else f"{low:.3g}–{high:.3g}°"
     about = f"The intervals of {fit.name} are about the incidences measured ({over}); beyond, they extrapolate."
+    if found.outcome == "not judged":
+        return (
+            f"{about} Whether misfits at neighbouring angles are alike cannot be judged from {count:,} readings: they "
+            "hold only if the model is right."
+        )
     if not found.found:
         return about
     return (
