@@ -25,8 +25,8 @@ def to_dict(study: Study) -> dict[str, Any]:
         {
             "fitmat": version("fitmat"),
             "file": m.source,
-            "n_samples": m.n_samples,
-            "n_masked": m.n_masked,
+            "n_samples": study.n_samples,
+            "n_masked": study.n_masked,
             "masked": m.masked,
             "notes": [*m.notes, *filter(None, [str(m.instrument)])],
             "noise": first.noise.words,

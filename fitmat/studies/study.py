@@ -54,6 +54,8 @@ class Study:
         choice: Which model the data prefer; None under a loss that weighs no models, and of a single model.
         full: Whether everything was asked; see `study`.
         warnings: What is odd about the measurements themselves, as sentences.
+        rows: How many rows were given, and in how many of them something is masked, where `measurements` holds only
+            some of them; else None.
     """
 
     findings: tuple[Findings, ...]
@@ -61,13 +63,24 @@ class Study:
     choice: Choice | None = None
     full: bool = False
     warnings: tuple[str, ...] = ()
+    rows: tuple[int, int] | None = None
 
     __repr__ = brief
 
     @property
     def measurements(self) -> Measurements:
-        """What was fitted."""
+        """What was fitted; of very many rows, those that are shown."""
         return self.findings[0].fit.measurements
+
+    @property
+    def n_samples(self) -> int:
+        """Rows that were given, masked ones included."""
+        return self.measurements.n_samples if self.rows is None else self.rows[0]
+
+    @property
+    def n_masked(self) -> int:
+        """Rows of these in which something is masked."""
+        return self.measurements.n_masked if self.rows is None else self.rows[1]
 
     @property
     def posteriors(self) -> tuple[Posterior, ...]:
@@ -77,7 +90,9 @@ class Study:
     def __str__(self) -> str:
         """What was fitted, how each fit ended, and the verdict of the match."""
         m, ends = self.measurements, [str(found.fit).partition("\n")[0] for found in self.findings]
-        return "\n".join([f"{m.source}: {m.n_samples} samples", *ends, *([self.match.verdict] if self.match else [])])
+        return "\n".join(
+            [f"{m.source}: {self.n_samples} samples", *ends, *([self.match.verdict] if self.match else [])]
+        )
 
     @property
     def detailed(self) -> tuple[Findings, ...]:
@@ -155,7 +170,15 @@ def study(
         first = _pass_over(stream, jobs, seed, say)
     walking = sampling and first[0].fit.loss.posterior and first[0].fit.n_values <= MOST_SAMPLED
     posteriors = sample_each(first, seed=seed, resume=resume, progress=say) if walking else first
-    return judge(posteriors, seed=seed, second_opinion=second_opinion, full=full, progress=say)
+    found = judge(posteriors, seed=seed, second_opinion=second_opinion, full=full, progress=say)
+    return found if stream is shown else dataclasses.replace(found, rows=_counted(measurements))
+
+
+def _counted(given: Measurements | Stream) -> tuple[int, int]:
+    """Rows, and those in which something is masked; of a file read in parts, as often as a reason was found."""
+    if isinstance(given, Measurements):
+        return given.n_samples, given.n_masked
+    return given.n_samples, min(sum(given.part.masked.values()), given.n_samples)
 
 
 def _as_stream(measurements: Measurements | Stream) -> Measurements | Stream:

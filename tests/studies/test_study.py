@@ -11,6 +11,7 @@ import pytest
 
 import fitmat as fm
 from fitmat.errors import FitmatError
+from fitmat.measurements.large import chunks
 from fitmat.measurements.samples import Measurements
 from fitmat.models.simulation import simulate
 from fitmat.reports import page, terminal
@@ -50,6 +51,28 @@ def test_a_study_holds_one_noun_for_each_model(studied: Study, measurements: Mea
         assert [q.name for q in found.parameters] == [*(e.name for e in found.fit.entries), "discrepancy"]
         assert [learnt.name for learnt in found.learnt] == list(found.fit.coordinates.names)
         assert found.residuals.shape == found.fit.data.x.shape
+
+
+def test_every_row_is_reported_where_some_are_shown(
+    measurements: Measurements, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of 51 rows with 3 masked 12 or so are at hand; from memory, and from a file read in parts."""
+    valid = measurements.valid.copy()
+    valid[[5, 20, 21]] = False
+    given = dataclasses.replace(measurements, valid=valid, source="gold.csv")
+    monkeypatch.setattr(room, "MOST_AT_ONCE", 40)
+    monkeypatch.setattr("fitmat.measurements.large.stream.PART", 12)
+    found = study(given, "lambert", sampling=False)
+    assert found.measurements.n_samples < 20
+    written = record.to_dict(found)
+    assert (written["n_samples"], written["n_masked"]) == (51, 3)
+    assert str(found).startswith("gold.csv: 51 samples\n")
+    path = tmp_path / "gold.csv"
+    value = np.where(valid, measurements.value, np.nan)
+    fm.write(dataclasses.replace(measurements, value=value), path)
+    read = study(chunks.scan(path, rows=20, part=12), "lambert", sampling=False)
+    assert (read.n_samples, read.n_masked) == (51, 3)
+    assert read.measurements.n_samples < 20
 
 
 def test_the_data_narrow_what_they_determine(studied: Study) -> None:
