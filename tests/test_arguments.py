@@ -115,6 +115,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             "sigma": ("x", 5, [], np.zeros(3), np.zeros((2, 1)), FIT),
             "channels": (None, "r", 5, ("r", "g"), FIT),
             "instrument": NOUN,
+            "stated": (None, "TIS", 0.3, [], (0.3,), FIT),
         },
     ),
     "Instrument": (

@@ -81,6 +81,9 @@ class Measurements:
     def __post_init__(self) -> None:
         arguments.kind("channels", self.channels, tuple, list)
         arguments.kind("instrument", self.instrument, Instrument)
+        arguments.kind("stated", self.stated, tuple)
+        for stated in self.stated:
+            arguments.kind("one of stated", stated, StatedAlbedo)
         count, columns = len(self.wi) if isinstance(self.wi, np.ndarray) else 0, len(self.channels)
         shapes = {"wi": (count, 3), "wo": (count, 3), "value": (count, columns), "valid": (count, columns)}
         for name, shape in (shapes | ({} if self.sigma is None else {"sigma": shapes["value"]})).items():
