@@ -76,5 +76,8 @@ def test_check_prints_laws_and_names_surprises(capsys, monkeypatch):
     assert manual.check(only=lambda name: name in ("lambert", "blinn-phong")) == []
     out = " ".join(capsys.readouterr().out.split())
     assert "broken 1.07" in out
+    assert "Broken as their manual pages say: 2. blinn-phong (energy), blinn-phong (furnace)" in out
+    assert "Broken unexpectedly: 0." in out
     monkeypatch.setattr(BlinnPhong, "breaks", {})
     assert manual.check(only=lambda name: name == "blinn-phong") == ["blinn-phong"]
+    assert "Broken unexpectedly: 1. blinn-phong (energy)" in " ".join(capsys.readouterr().out.split())

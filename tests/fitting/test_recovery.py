@@ -9,7 +9,7 @@ from selection import always
 
 import fitmat as fm
 from fitmat.fitting.result import Fit
-from fitmat.models.laws import example
+from fitmat.models.laws import examples
 from fitmat.models.registry import LOBES
 
 SIGMAS = 3.5
@@ -110,7 +110,7 @@ def twins(values: dict[str, Any]) -> list[dict[str, Any]]:
 
 def deviation(found: Fit, name: str, values: dict[str, Any]) -> float:
     """The largest |estimate − truth|/sd of the free parameters."""
-    truth = fm.model(example(name), **values)
+    truth = fm.model(examples(name)[0], **values)
     sd = np.sqrt(np.diagonal(found.covariance))[found.free]
     gap = found.values - np.concatenate([np.ravel(leaf) for leaf in jax.tree.leaves(truth)])
     return float(np.abs(gap[found.free] / sd).max())
@@ -126,8 +126,8 @@ def test_no_lobe_is_left_out() -> None:
 @pytest.mark.parametrize("name", always(QUICK, CASES))
 def test_the_truth_is_recovered(name: str) -> None:
     values, held = CASES[name]
-    truth = fm.model(example(name), **values)
-    found = fm.fit(measured(truth, brushed=not truth.isotropic), example(name), fixed=held)
+    truth = fm.model(examples(name)[0], **values)
+    found = fm.fit(measured(truth, brushed=not truth.isotropic), examples(name)[0], fixed=held)
     assert found.result == "converged"
     assert found.misfit_ratio < 0.5
     assert min(deviation(found, name, twin) for twin in twins(values)) < SIGMAS
