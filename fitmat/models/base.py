@@ -65,7 +65,7 @@ class AbstractBRDF(eqx.Module):
 
     @abstractmethod
     def diffuse_albedo(self) -> Spectrum:
-        """Albedo of what leaves in all directions alike, in [0, 1]; what a coat above sends back and forth."""
+        """Albedo of what leaves in all directions alike, in [0, 1], for light from everywhere."""
 
 
 class AbstractShape(eqx.Module):
