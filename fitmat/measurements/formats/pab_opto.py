@@ -95,6 +95,8 @@ def _stated(text: str) -> dict[str, tuple[str, int]]:
 
 
 def _head(stated: Mapping[str, tuple[str, int]], source: str) -> _Head:
+    if "format" not in stated:
+        raise ReadError(f"{source}: no line #format that can be read, expected theta phi BSDF. Correct the head.")
     words = stated["format"][0].split()
     kind = words[2].lower() if len(words) > 2 else ""
     if kind == "btdf":

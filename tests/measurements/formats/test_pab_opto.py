@@ -142,6 +142,14 @@ def test_bad_files_are_refused_in_a_sentence(write: Write, text: str, message: s
         reader.read(write(text))
 
 
+def test_a_byte_order_mark_of_another_encoding_is_refused(tmp_path: Path) -> None:
+    """What reads as a head in bytes is none in UTF-16."""
+    path = tmp_path / "a.txt"
+    path.write_bytes(b"\xfe\xff" + HEAD.encode() + b"10 0 1\n")
+    with pytest.raises(ReadError, match="no line #format that can be read, expected theta phi BSDF"):
+        reader.read(path)
+
+
 def test_it_claims_heads_that_say_where_the_light_is() -> None:
     assert pab_opto.claims(MANUAL.encode(), 9)
     assert pab_opto.claims(HEAD.replace(" ", "\t").replace("#", "# ").encode(), 9)
