@@ -28,7 +28,7 @@ GOAL = 1e-3
 MOST_NODES = (512, 2048)
 """In zenith, and in azimuth on one side."""
 
-STREAK = 4.0
+STREAK = 2.0
 """Azimuths on one side times the width for anisotropic models: the streak of a brushed surface is that narrow."""
 
 LEAST = 1e-4
