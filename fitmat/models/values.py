@@ -20,8 +20,8 @@ from fitmat.models.parameters import vector, with_vector
 SMALL, LARGE = (32, 1024), (16, 16384)
 """Draws and directions of the two blocks that are compiled; the large one is compiled only where it is filled by half.
 
-A block takes 0.01–0.02 µs a value and 0.2 ms; a coat or a lobe that integrates over its facets takes 1–3 ms a draw
-besides, however many directions follow. Draws that fill up a block cost nothing.
+A block takes 0.01–0.02 µs a value and 0.2 ms; a coat takes 0.2–1 ms a draw besides, however many directions
+follow. Draws that fill up a block cost nothing.
 """
 
 
