@@ -79,6 +79,13 @@ def _programs(request: pytest.FixtureRequest) -> Iterator[None]:
         gc.collect()
 
 
+@pytest.fixture(autouse=True)
+def _elsewhere(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Give each test of commands a current folder of its own: into it they write unless they are told another."""
+    if request.path.parent.name == "cli":
+        monkeypatch.chdir(request.getfixturevalue("tmp_path"))
+
+
 Hemisphere = Callable[[int, int], np.ndarray]
 """(number, seed) → that many unit vectors above the surface, uniform in solid angle, shape (n, 3)."""
 
