@@ -37,6 +37,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from lanes import mapped
 from oracles import disney_brdf
 
 from fitmat.fitting.coordinates import coordinates
@@ -146,7 +147,7 @@ def _ours(template: Any, drawn: dict[str, np.ndarray], rotation: np.ndarray, wi:
     """The model's values, with its own parameters for each pair."""
     columns = drawn | {"rotation": rotation, "base_color": drawn["base_color"] ** 2.2}
     rows = np.concatenate([np.reshape(columns[e.name], (len(wi), -1)) for e in entries(template)], axis=1)
-    return jax.jit(jax.vmap(lambda row, a, b: with_vector(template, row)(a, b)))(rows, wi, wo)
+    return mapped(lambda row, a, b: with_vector(template, row)(a, b), [], [rows, wi, wo])[0]
 
 
 @pytest.mark.parametrize("remap", [True, False])
@@ -457,14 +458,13 @@ def test_values_and_gradients_are_finite_at_every_bound(cls: Disney, singular: P
         for b in (bounds.lower, bounds.upper)
     ]
     corners = np.where(rng.uniform(size=(100, len(default))) < 0.5, bounds.lower, bounds.upper)
-    rows = jnp.array([bounds.lower, bounds.upper, *single, *corners])
-    wi, wo = (jnp.array(column) for column in zip(*singular.values(), strict=True))
+    rows = np.array([bounds.lower, bounds.upper, *single, *corners])
+    wi, wo = (np.array(column) for column in zip(*singular.values(), strict=True))
 
     def total(row: jax.Array, a: jax.Array, b: jax.Array) -> jax.Array:
         return jnp.sum(with_vector(model, row)(a, b))
 
-    both = jax.vmap(jax.value_and_grad(total, argnums=(0, 1, 2)), (None, 0, 0))
-    value, slopes = jax.jit(jax.vmap(both, (0, None, None)))(rows, wi, wo)
+    value, slopes = mapped(jax.value_and_grad(total, argnums=(0, 1, 2)), [rows], [wi, wo])
     assert np.all(value >= 0)
     for found in (value, *slopes):
         broken = ~np.isfinite(np.asarray(found)).reshape(len(rows), len(singular), -1)

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from lanes import mapped
 from oracles import field_papers, field_programs
 from scipy.integrate import quad
 from scipy.special import hyp2f1
@@ -383,28 +384,15 @@ def test_abg_scatters_as_much_as_its_level_says() -> None:
     np.testing.assert_allclose(evaluate(build(ABg, 0.03, 0.2, 0.1), wi, wi * [-1, -1, 1]), [[0.15]], rtol=EXACT)
 
 
-ROWS = 192
-"""Rows of every call of a program, so that each compiles once: 15 singular pairs × 12 corners, and 60 draws."""
-
-
-def _with_slopes(structure: AbstractBRDF) -> Callable[..., tuple[jax.Array, tuple[jax.Array, ...]]]:
-    """f and its slopes in (parameters, ω_i, ω_o) for `ROWS` of each."""
+def _slopes(model: AbstractBRDF, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """f (n,) and its slopes (n, p + 6) at rows of parameters, ω_i and ω_o, (n, p + 6)."""
 
     def one(values: jax.Array, wi: jax.Array, wo: jax.Array) -> jax.Array:
-        return jnp.sum(with_vector(structure, values)(wi, wo))
+        return jnp.sum(with_vector(model, values)(wi, wo))
 
-    return jax.jit(jax.vmap(jax.value_and_grad(one, argnums=(0, 1, 2))))
-
-
-_PROGRAMS = {model.name: _with_slopes(model) for model in MODELS}
-
-
-def _slopes(model: AbstractBRDF, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """f (n,) and its slopes (n, p + 6) at rows of parameters, ω_i and ω_o, (n, p + 6); n ≤ `ROWS`."""
     size = rows.shape[1] - 6
-    filled = np.concatenate([rows, np.repeat(rows[-1:], ROWS - len(rows), axis=0)])
-    f, slopes = _PROGRAMS[model.name](*np.split(filled, [size, size + 3], axis=1))
-    return np.asarray(f)[: len(rows)], np.concatenate([np.asarray(s) for s in slopes], axis=1)[: len(rows)]
+    f, slopes = mapped(jax.value_and_grad(one, argnums=(0, 1, 2)), [], np.split(rows, [size, size + 3], axis=1))
+    return f[0], np.concatenate([slope[0] for slope in slopes], axis=1)
 
 
 def _corners(model: AbstractBRDF) -> np.ndarray:
@@ -437,11 +425,11 @@ def test_slopes_are_those_of_differences(model: AbstractBRDF, hemisphere: Hemisp
     point = np.concatenate([values, hemisphere(count, 42), hemisphere(count, 43)], axis=1)
 
     f, slopes = _slopes(model, point)
-    for k in range(point.shape[1]):
-        step = np.zeros_like(point)
-        step[:, k] = 1e-4 * point[:, k]
-        near = [_slopes(model, point + j * step)[0] for j in (-2, -1, 1, 2)]
-        expected = (near[0] - 8 * near[1] + 8 * near[2] - near[3]) / (12 * step[:, k])
+    steps = 1e-4 * np.eye(point.shape[1])[:, None, None] * np.array([-2, -1, 1, 2])[:, None, None]
+    moved = point * (1 + steps)
+    every = _slopes(model, moved.reshape(-1, point.shape[1]))[0].reshape(*moved.shape[:3])
+    for k, near in enumerate(every):
+        expected = (near[0] - 8 * near[1] + 8 * near[2] - near[3]) / (12 * 1e-4 * point[:, k])
         scale = np.abs(slopes[:, k]) + (f + UNDERFLOW) / np.abs(point[:, k])
         smooth = f > UNDERFLOW
         assert np.all((np.abs(slopes[:, k] - expected) < DIFFERENCES * scale)[smooth]), k
