@@ -14,7 +14,7 @@ import fitmat as fm
 from fitmat.errors import ModelError
 from fitmat.fitting.coordinates import coordinates
 from fitmat.models.base import AbstractBRDF
-from fitmat.models.laws import example
+from fitmat.models.laws import examples
 from fitmat.models.parameters import entries, vector, with_vector
 from fitmat.models.registry import LOBES
 
@@ -184,7 +184,7 @@ def test_channels_widen_only_what_is_per_channel() -> None:
 
 def test_names_are_read_loosely_and_written_strictly() -> None:
     assert fm.model("Lambert + GGX").name == "lambert+ggx"
-    assert all(fm.model(example(lobe)).name == example(lobe) for lobe in LOBES)
+    assert all(fm.model(examples(lobe)[0]).name == examples(lobe)[0] for lobe in LOBES)
 
 
 def test_a_sum_is_as_narrow_as_its_narrowest_lobe() -> None:
@@ -274,6 +274,6 @@ def test_only_models_with_axes_change_when_both_directions_turn(name: str, hemis
     wi, wo = hemisphere(60, 20), hemisphere(60, 21)
     turn = np.array([[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
     with_axes: dict[str, Any] = next((axes for family, axes in AXES.items() if family in name), {})
-    model = fm.model(example(name), **with_axes)
+    model = fm.model(examples(name)[0], **with_axes)
     straight, turned = (mapped(model, [], [wi @ turning, wo @ turning]) for turning in (np.eye(3), turn))
     assert model.isotropic == np.allclose(turned, straight, rtol=TURNED)

@@ -11,7 +11,7 @@ import pytest
 
 import fitmat as fm
 from fitmat.errors import ModelError
-from fitmat.models.laws import example
+from fitmat.models.laws import examples
 from fitmat.models.parameters import (
     as_parameter,
     assignments,
@@ -57,7 +57,7 @@ def _holders(module: Any) -> list[Any]:
     return [module, *(found for part in inner if isinstance(part, eqx.Module) for found in _holders(part))]
 
 
-@pytest.mark.parametrize("name", [*(example(lobe) for lobe in LOBES), "lambert+ggx"])
+@pytest.mark.parametrize("name", [*(examples(lobe)[0] for lobe in LOBES), "lambert+ggx"])
 def test_every_entry_points_at_its_own_number(name: str) -> None:
     """Names and vector come from two walks over the model; they must agree on the order."""
     built = fm.model(name, channels=2)
