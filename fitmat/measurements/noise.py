@@ -32,6 +32,9 @@ COPIED = 1e-12
 TRACE = 1e-6
 """Of the median: no instrument's floor lies so far below what it reads."""
 
+LEAST_SAID = 1e-5
+"""Relative noise below which a law is said to have none."""
+
 LEAST_SIGMA = 1e-9
 """Of the largest σ: what is smaller counts as this where a law of the noise is sought."""
 
@@ -132,7 +135,8 @@ def law_words(laws: Float[np.ndarray, "c 2"], channels: tuple[str, ...]) -> str:
     if not np.isfinite(laws).all():
         return UNKNOWN
     named = [f" ({visible(channel)})" if len(channels) > 1 else "" for channel in channels]
-    parts = (f"{100 * b:.2g} % + {a:.2g} sr⁻¹{name}" for (a, b), name in zip(laws, named, strict=True))
+    relative = [f"{100 * b:.2g}" if b > LEAST_SAID else "0" for b in laws[:, 1]]
+    parts = (f"{b} % + {a:.2g} sr⁻¹{name}" for a, b, name in zip(laws[:, 0], relative, named, strict=True))
     return f"Noise estimated from neighbouring angles: {'; '.join(parts)}."
 
 

@@ -24,8 +24,8 @@ def parameter_rows(found: Findings) -> list[dict[str, str]]:
             for k in range(len(q.value)):
                 low, high = q.ci95[k]
                 channel = f" {visible(channels[k])}" if q.per_channel and len(channels) > 1 else ""
-                free = q.remark != "fixed" and np.isfinite(low) and np.isfinite(high)
-                sd = math.nan if q.remark == UNDETERMINED else q.sd[k]
+                free = q.remarks[k] != "fixed" and np.isfinite(low) and np.isfinite(high)
+                sd = math.nan if q.remarks[k] == UNDETERMINED else q.sd[k]
                 result.append(
                     {
                         "kind": kind,
@@ -34,7 +34,7 @@ def parameter_rows(found: Findings) -> list[dict[str, str]]:
                         "value": with_error(q.value[k], sd),
                         "interval": interval(low, high, sd) if free else "",
                         "unit": "" if q.unit == "1" else q.unit,
-                        "remark": q.remark,
+                        "remark": q.remarks[k],
                         "doc": q.doc,
                     }
                 )

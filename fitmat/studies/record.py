@@ -59,7 +59,7 @@ def _fit_dict(found: Findings) -> dict[str, Any]:
         "scope": found.scope,
         "several_facets": found.several_facets,
         "readings": {"fitted": fit.n_values, "independent": fit.correlation.independent},
-        "not_determined": [q.name for q in found.parameters if q.remark == UNDETERMINED],
+        "not_determined": [q.name for q in found.parameters if UNDETERMINED in q.remarks],
         "n_starts": fit.n_starts,
         "n_starts_agreeing": fit.n_starts_agreeing,
         "steps": fit.steps,
@@ -110,8 +110,8 @@ def _choice_dict(choice: Choice) -> dict[str, Any]:
 def _quantity_dict(q: Quantity, channels: int) -> dict[str, Any]:
     """Scalars for shared quantities and single-channel files, else lists in channel order."""
     scalar = not q.per_channel or channels == 1
-    value, sd, ci95 = ((a[0] if scalar else a) for a in (q.value, q.sd, q.ci95))
-    return {"value": value, "sd": sd, "ci95": ci95, "unit": q.unit, "symbol": q.symbol, "remark": q.remark}
+    value, sd, ci95, remark = ((a[0] if scalar else a) for a in (q.value, q.sd, q.ci95, q.remarks))
+    return {"value": value, "sd": sd, "ci95": ci95, "unit": q.unit, "symbol": q.symbol, "remark": remark}
 
 
 def _match_dict(match: Match) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from fitmat.fitting.coordinates import coordinates
+from fitmat.fitting.coordinates import channel_names, coordinates
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
 from fitmat.models.terms.fresnel import eta_from_f0, f0_from_eta
 from fitmat.text import brief
@@ -31,10 +31,10 @@ class Quantity:
         unit: "1" for none.
         doc: What it means.
         value: Best fit, (k,).
-        sd: Standard deviation, (k,); NaN where `remark` says why there is none.
+        sd: Standard deviation, (k,); NaN where `remarks` says why there is none.
         ci95: 95 % interval, (k, 2).
         per_channel: Whether the k entries are channels.
-        remark: "" or a reason: "fixed", "at its lower bound", "not determined by these angles".
+        remarks: (k,); "" or a reason: "fixed", "at its lower bound", "not determined by these angles".
     """
 
     name: str
@@ -45,7 +45,7 @@ class Quantity:
     sd: np.ndarray
     ci95: np.ndarray
     per_channel: bool
-    remark: str
+    remarks: tuple[str, ...]
 
     __repr__ = brief
 
@@ -58,10 +58,10 @@ def parameters(posterior: Posterior, undetermined: Collection[str] = ()) -> list
 
     Args:
         posterior: Of the fit.
-        undetermined: Names of parameters that are not determined beside those of the fit.
+        undetermined: Names of parameters, with their channel where there are several, that are not determined beside
+            those of the fit.
     """
     fit = posterior.fit
-    lost = {*fit.undetermined, *undetermined}
     sampled = posterior.exact
     sd = posterior.sd() if sampled else np.sqrt(np.diagonal(fit.covariance))
     if not fit.loss.posterior:
@@ -73,16 +73,17 @@ def parameters(posterior: Posterior, undetermined: Collection[str] = ()) -> list
     for entry in fit.entries:
         held, p = entry.name in fit.held, entry.param
         remark = "fixed" if held else ""
-        if entry.name in lost:
+        if entry.name in fit.undetermined:
             remark = UNDETERMINED
         elif entry.name in fit.on_bound:
             remark = f"at its {fit.on_bound[entry.name]} bound"
+        names = channel_names(entry, fit.measurements.channels)
         given = np.full(entry.size, np.nan) if held else sure[entry.place]
         result.append(
             Quantity(
                 *(entry.name, p.symbol, p.unit, p.doc, fit.values[entry.place], given, ci95[entry.place]),
                 per_channel=bool(entry.shape),
-                remark=remark,
+                remarks=tuple(UNDETERMINED if name in undetermined else remark for name in names),
             )
         )
     return [*result, _discrepancy(posterior)] if fit.loss.infers_discrepancy else result
@@ -96,7 +97,7 @@ def _discrepancy(posterior: Posterior) -> Quantity:
     return Quantity(
         *("discrepancy", "s", "sr^(-1/3)", words, np.array([best]), np.array([draws.std()]), ends[None]),
         per_channel=False,
-        remark="",
+        remarks=("",),
     )
 
 
@@ -154,4 +155,4 @@ def _from_draws(
     if not posterior.fit.loss.posterior:
         ci95 = np.full_like(ci95, np.nan)
     sd = np.where(np.isfinite(origin.sd), draws[1:].std(axis=0), np.nan)
-    return Quantity(name, symbol, "1", doc, draws[0], sd, ci95, origin.per_channel, origin.remark)
+    return Quantity(name, symbol, "1", doc, draws[0], sd, ci95, origin.per_channel, origin.remarks)

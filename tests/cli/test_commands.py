@@ -279,7 +279,7 @@ def test_a_run_whose_page_fails_keeps_its_numbers(run, tmp_path, monkeypatch):
 
     monkeypatch.setattr("fitmat.reports.plot.curves", torn)
     drawn = run("fit", DATA / "sparse.csv", *QUICK, "--out", tmp_path / "drawn")
-    monkeypatch.setattr("fitmat.reports.page.jinja2.Environment", torn)
+    monkeypatch.setattr("fitmat.reports.page._environment", torn)
     made = run("fit", DATA / "sparse.csv", *QUICK, "--out", tmp_path / "made")
     assert (drawn.code, made.code) == (0, 0)
     lacks = (

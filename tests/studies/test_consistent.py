@@ -44,9 +44,9 @@ def contradictions(found: Study) -> list[str]:
 def _points(found: Study) -> Iterator[str]:
     for one in found.findings:
         for q in (*one.parameters, *one.derived):
-            for value, (low, high) in zip(q.value, q.ci95, strict=True):
-                slack, none = ROUNDING * max(abs(value), 1.0), np.isnan(low) and np.isnan(high) and q.remark != ""
-                if q.remark != "fixed" and not none and not low - slack <= value <= high + slack:
+            for value, (low, high), remark in zip(q.value, q.ci95, q.remarks, strict=True):
+                slack, none = ROUNDING * max(abs(value), 1.0), np.isnan(low) and np.isnan(high) and remark != ""
+                if remark != "fixed" and not none and not low - slack <= value <= high + slack:
                     yield f"{one.name} {q.name}: {value} outside {low} – {high}"
     for place, e in estimates(found.match):
         if e.has_interval and not e.ci95[0] - ROUNDING <= e.value <= e.ci95[1] + ROUNDING:
@@ -56,13 +56,14 @@ def _points(found: Study) -> Iterator[str]:
 def _states(found: Study) -> Iterator[str]:
     written = {one["model"]: one for one in record.to_dict(found)["fits"]}
     for one in found.findings:
-        lost = {q.name for q in one.parameters if q.remark == UNDETERMINED}
+        lost = {q.name for q in one.parameters if UNDETERMINED in q.remarks}
+        rows = {row["name"] for row in parameter_rows(one) if (row["kind"], row["remark"]) == ("fitted", UNDETERMINED)}
         if set(written[one.name]["not_determined"]) != lost:
             yield f"{one.name}: the record calls other parameters not determined than the table"
         if not set(one.fit.undetermined) <= lost:
             yield f"{one.name}: {one.fit.undetermined} not determined by the fit, {lost} in the table"
-        if one.identifiability is not None and set(one.identifiability.undetermined) != lost:
-            yield f"{one.name}: identifiability {one.identifiability.undetermined}, table {lost}"
+        if one.identifiability is not None and set(one.identifiability.undetermined) != rows:
+            yield f"{one.name}: identifiability {one.identifiability.undetermined}, table {rows}"
         for row in parameter_rows(one):
             if row["remark"] == UNDETERMINED and "±" in row["value"]:
                 yield f"{one.name} {row['name']}: a standard deviation of what is not determined"

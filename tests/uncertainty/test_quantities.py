@@ -48,7 +48,7 @@ def test_parameters_are_listed_with_their_discrepancy(fit: Fit) -> None:
         ("discrepancy", "s", "sr^(-1/3)"),
     ]
     assert np.concatenate([q.value for q in found[:4]]).tolist() == fit.values.tolist()
-    assert [q.remark for q in found] == [""] * 5
+    assert [q.remarks for q in found] == [("",)] * 5
     assert [q.per_channel for q in found] == [True, True, False, False, False]
 
 
@@ -103,10 +103,10 @@ def test_remarks_say_why_a_number_is_missing(fit: Fit) -> None:
     model = fm.model("lambert+ggx", channels=1, kd=1.0, ks=0.0, alpha=0.3, eta=1.5)
     other = dataclasses.replace(fit, model=model, held={"eta": np.array([1.5])}, undetermined=("alpha",))
     found = named(parameters(fm.laplace(other, seed=1)))
-    assert found["kd"].remark == "at its upper bound"
-    assert found["ks"].remark == "at its lower bound"
-    assert found["eta"].remark == "fixed"
-    assert found["alpha"].remark == "not determined by these angles"
+    assert found["kd"].remarks == ("at its upper bound",)
+    assert found["ks"].remarks == ("at its lower bound",)
+    assert found["eta"].remarks == ("fixed",)
+    assert found["alpha"].remarks == ("not determined by these angles",)
     assert np.isnan([found[name].sd for name in ("kd", "ks", "eta")]).all()
 
 
@@ -159,6 +159,6 @@ def test_what_follows_from_an_unknown_is_unknown(fit: Fit) -> None:
     posterior = draws(fit, "ggx", {"ks": 1.0, "alpha": 0.1, "eta": 3.0})
     unknown = dataclasses.replace(posterior, fit=dataclasses.replace(posterior.fit, held={"eta": np.array([3.0])}))
     f0 = named(following(unknown))["f0"]
-    assert f0.remark == "fixed"
+    assert f0.remarks == ("fixed",)
     assert np.isnan(f0.sd).all()
     assert following(draws(fit, "lambert", {"kd": 0.3})) == []

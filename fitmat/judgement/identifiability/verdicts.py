@@ -103,9 +103,8 @@ class Identifiability:
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """Names of parameters that these angles do not determine, in one channel at least."""
-        lost = {name for v in self.verdicts if v.state == STATES[2] for name in (v.name, v.name.rpartition(" ")[0])}
-        return tuple(entry.name for entry in self.fit.entries if entry.name in lost)
+        """Names of parameters, with their channel where there are several, that these angles do not determine."""
+        return tuple(v.name for v in self.verdicts if v.state == STATES[2])
 
     @property
     def words(self) -> str:
