@@ -31,6 +31,9 @@ MOST_NODES = (512, 2048)
 STREAK = 2.0
 """Azimuths on one side times the width for anisotropic models: the streak of a brushed surface is that narrow."""
 
+FEW_AZIMUTHS = 256
+"""The most of them in `first_albedo`."""
+
 LEAST = 1e-4
 """What the bound never falls below: two rules may agree by chance."""
 
@@ -84,10 +87,25 @@ def albedo(model: AbstractBRDF, theta_i: ArrayLike | None = None, phi_i: ArrayLi
     if theta.ndim != 1 or phi.shape not in ((), (1,), theta.shape) or not theta.size:
         raise ModelError(f"theta_i and phi_i have shapes {theta.shape} and {phi.shape}: expected the same (k,), k ≥ 1.")
     theta, phi = np.broadcast_arrays(theta, phi)
+    return _refined(*_first_rule(model, MOST_NODES[1]), (theta, phi), GOAL)
+
+
+def first_albedo(model: AbstractBRDF, theta_i: Float[np.ndarray, " k"]) -> Albedo:
+    """`albedo` by few nodes, whatever its bound: where many models are looked at and a large bound does no harm.
+
+    Args:
+        model: From `fitmat.model`.
+        theta_i: Zenith angles of incidence in radians.
+    """
+    return _refined(*_first_rule(model, FEW_AZIMUTHS), (theta_i, 0.0 * theta_i), np.inf)
+
+
+def _first_rule(model: AbstractBRDF, most: int) -> tuple[Draws, float, tuple[int, int]]:
+    """A model with its values, its width, and how many nodes in zenith and azimuth, `most` at most, come first."""
     part = model, vector(model)[None]
     width = float(widths(*part)[0])
-    azimuths = AZIMUTH_NODES if model.isotropic else max(AZIMUTH_NODES, min(int(STREAK / width), MOST_NODES[1]))
-    return _refined(part, width, (theta, phi), (ZENITH_NODES, azimuths))
+    azimuths = AZIMUTH_NODES if model.isotropic else max(AZIMUTH_NODES, min(int(STREAK / width), most))
+    return part, width, (ZENITH_NODES, azimuths)
 
 
 def _from_everywhere(model: AbstractBRDF) -> Albedo:
@@ -99,18 +117,20 @@ def _from_everywhere(model: AbstractBRDF) -> Albedo:
     return Albedo((share @ found.value)[None], (share @ found.error)[None])
 
 
-def _refined(part: Draws, width: float, angles: tuple[np.ndarray, np.ndarray], nodes: tuple[int, int]) -> Albedo:
-    """By that many nodes; incidences that miss `GOAL` again with twice as many where they are too few."""
+def _refined(
+    part: Draws, width: float, nodes: tuple[int, int], angles: tuple[np.ndarray, np.ndarray], wanted: float
+) -> Albedo:
+    """By that many nodes; incidences with a larger bound than wanted again by twice as many where these are too few."""
     fine = _albedo(part, width, angles, nodes)
     sparse = [(round(nodes[0] * COARSER), nodes[1]), (nodes[0], round(nodes[1] * COARSER))]
     apart = np.stack([2.0 * np.abs(fine - _albedo(part, width, angles, few)) for few in sparse])
     found = Albedo(fine, apart.sum(axis=0) + LEAST)
-    goal = GOAL * np.maximum(1.0, fine)
+    goal = wanted * np.maximum(1.0, fine)
     far = (found.error > goal).any(axis=1)
     few = np.any(apart[:, far] > (goal / 4)[far], axis=(1, 2))
     more = min(nodes[0] * (1 + few[0]), MOST_NODES[0]), min(nodes[1] * (1 + few[1]), MOST_NODES[1])
     if far.any() and more != nodes:
-        again = _refined(part, width, (angles[0][far], angles[1][far]), more)
+        again = _refined(part, width, more, (angles[0][far], angles[1][far]), wanted)
         found.value[far], found.error[far] = again.value, again.error
     return found
 

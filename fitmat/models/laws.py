@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 
 from fitmat.maths.directions import from_angles, mirror
 from fitmat.maths.programs import program
-from fitmat.models.albedo import albedo
+from fitmat.models.albedo import first_albedo
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.lobes.kulla_conty import KullaConty
 from fitmat.models.lobes.microfacet import Microfacet
@@ -110,7 +110,7 @@ def check(template: AbstractBRDF, *, seed: int) -> dict[str, Finding]:
 
 def _reflected(model: AbstractBRDF, *, sure: bool) -> Float[np.ndarray, "k c"]:
     """Albedo at `ANGLES` with the mirror image of a polished coat; less the error of its quadrature where `sure`."""
-    found = albedo(model, ANGLES)
+    found = first_albedo(model, ANGLES)
     image = np.asarray(_mirror(model, from_angles(ANGLES, 0.0 * ANGLES)))
     return found.value - found.error * sure + image
 
