@@ -52,7 +52,7 @@ from fitmat.cli.flags.simulate import (
     ThetaOFlag,
 )
 from fitmat.cli.flags.version import VersionFlag
-from fitmat.text import for_shell, visible
+from fitmat.text import visible
 
 DEFAULT_MODELS = "lambert+blinn-phong,lambert+ggx"
 NOT_CONVERGED = 3
@@ -165,8 +165,7 @@ def simulate(
     if catalogue is not None:
         written = simulate.write_catalogue(catalogue, force=force)
     else:
-        angles = simulate.grid(theta_i, theta_o, phi, phi_i)
-        truth = simulate.truth(model, set_ or [], masking)
+        angles, truth = simulate.grid(theta_i, theta_o, phi, phi_i), simulate.truth(model, set_ or [], masking)
         written = simulate.write_simulation(
             out, truth, angles, noise=(noise, floor, seed), samples=samples, instrument=instrument, force=force
         )
@@ -192,18 +191,13 @@ def check(
 
     with programs.ahead("check"):
         from fitmat.cli import check
-        from fitmat.judgement.examination.examining import examine
-        from fitmat.measurements.reader import read
-        from fitmat.reports.pictures import refuse_picture
 
-        refuse_picture(plot, force=force)
-        found = examine(read(files, **reading, instrument=instrument))
+        found = check.examined(files, reading | {"instrument": instrument}, plot, force=force)
     process.say(check.as_json(found) if json_ else str(found))
     if plot is not None:
         check.draw(found, plot)
     elif not json_:
-        given = " ".join([*map(for_shell, files), *(["--join"] if len(files) > 1 else [])])
-        process.say(f"See what was measured where: fitmat check {given} --plot coverage.png")
+        process.say(check.hint(files))
 
 
 @app.command(
@@ -273,12 +267,10 @@ def design(
 
         with programs.ahead("design"), programs.announced(watch.compiling):
             from fitmat.cli import design
-            from fitmat.measurements.reader import read
             from fitmat.reports.pictures import refuse_picture
 
             refuse_picture(plot, force=force)
-            measurements = read(files, **reading, instrument=instrument)
-            posteriors = design.fitted(measurements, models, fix or [], seed, watch)
+            posteriors = design.fitted(files, reading | {"instrument": instrument}, models, fix or [], seed, watch)
             watch("looking for the next angles", 0, 0)
             found = design.propose(posteriors, for_, kind=kind, count=count)
     process.say(design.as_json(found) if json_ else design.as_text(found))

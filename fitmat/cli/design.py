@@ -4,7 +4,7 @@ It chooses nothing itself.
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
@@ -13,12 +13,12 @@ import numpy as np
 from fitmat._types import Progress
 from fitmat.judgement.design.design import MATCH, Design, Proposal, next_angles
 from fitmat.match.match import is_microfacet
-from fitmat.measurements.samples import Measurements
+from fitmat.measurements.reader import read
 from fitmat.models.parameters import assignments
 from fitmat.reports.pictures import write_picture
 from fitmat.studies.plan import plan
-from fitmat.studies.study import fit_each
 from fitmat.text import plain, text_table
+from fitmat.uncertainty.laplace import laplace_each
 from fitmat.uncertainty.posterior import Posterior
 
 if TYPE_CHECKING:
@@ -26,22 +26,29 @@ if TYPE_CHECKING:
 
 
 def fitted(
-    measurements: Measurements, models: str, fixed: Sequence[str], seed: int, progress: Progress
+    sources: Sequence[Path],
+    reading: Mapping[str, Any],
+    models: str,
+    fixed: Sequence[str],
+    seed: int,
+    progress: Progress,
 ) -> list[Posterior]:
     """The posteriors around which the next measurements are looked for.
 
     Args:
-        measurements: From `fitmat.read`.
+        sources: Files to read, as one measurement.
+        reading: Arguments of `fitmat.read`.
         models: Names, with commas between them.
         fixed: What `--fix` says.
         seed: Of the draws.
         progress: Called with what is done next.
 
     Raises:
-        FitmatError: as `fitmat.fit`.
+        FitmatError: as `fitmat.read` and `fitmat.fit`.
     """
+    measurements = read(sources, **reading)
     jobs = plan(models, measurements, fixed=assignments(fixed, "--fix"))
-    return fit_each(measurements, jobs, seed=seed, progress=progress)
+    return laplace_each(measurements, jobs, seed=seed, progress=progress)
 
 
 def propose(

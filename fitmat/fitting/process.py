@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
+from fitmat.maths.normal import Z95
+
 RANK = 160
 """Most columns of the pivoted Cholesky factor that stands for K."""
 
@@ -19,8 +21,6 @@ FEWEST = 20
 
 RATIOS = np.concatenate([[0.0], np.logspace(-4.0, 6.0, 121)])
 """τ²/η² that are tried."""
-
-Z95 = 1.959964
 
 ASKED = 3.0
 """Nats by which the process must raise the restricted likelihood; below, it is left out and no interval changes.

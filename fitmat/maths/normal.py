@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+Z95 = 1.959964
+"""Standard deviations to either end of a central 95 % interval."""
+
 SMALL, LARGE = 0.46875, 4.0
 """Where Cody's approximations of the error function meet."""
 

@@ -165,7 +165,7 @@ def study(
     known = {"fixed": fixed, "priors": priors, "loss": loss, "masking": masking, "ior": ior, "tilt": tilt}
     jobs = plan(models, shown, **known)
     if isinstance(stream, Measurements):
-        first = fit_each(stream, jobs, seed=seed, corrected=not sampling, progress=say)
+        first = laplace_each(stream, jobs, seed=seed, corrected=not sampling, progress=say)
     else:
         first = _pass_over(stream, jobs, seed, say)
     walking = sampling and first[0].fit.loss.posterior and first[0].fit.n_values <= MOST_SAMPLED
@@ -185,21 +185,6 @@ def _as_stream(measurements: Measurements | Stream) -> Measurements | Stream:
     if isinstance(measurements, Measurements) and measurements.n_samples > MOST_AT_ONCE:
         return hold(measurements)
     return measurements
-
-
-def fit_each(
-    measurements: Measurements, jobs: Jobs, *, seed: int, corrected: bool = True, progress: Progress | None = None
-) -> list[Posterior]:
-    """Every model of a plan fitted, with Laplace's approximation around each fit.
-
-    Args:
-        measurements: From `fitmat.read`.
-        jobs: From `plan`.
-        seed: Of the draws.
-        corrected: Whether the draws are weighted until they follow the posterior.
-        progress: Called with what is done next.
-    """
-    return laplace_each(measurements, jobs, seed=seed, corrected=corrected, progress=progress)
 
 
 def _pass_over(stream: Stream, jobs: Jobs, seed: int, say: Progress) -> list[Posterior]:

@@ -9,13 +9,12 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from fitmat.fitting.coordinates import channel_names, coordinates
+from fitmat.maths.normal import Z95
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
 from fitmat.models.terms.fresnel import eta_from_f0, f0_from_eta
 from fitmat.text import brief
 from fitmat.uncertainty.estimate import limits
 from fitmat.uncertainty.posterior import Posterior
-
-Z95 = 1.959964
 
 UNDETERMINED = "not determined by these angles"
 """Remark on what has an interval but no value to rely on."""

@@ -13,7 +13,8 @@ from fitmat.cli import session
 from fitmat.models.simulation import simulate
 from fitmat.reports import terminal
 from fitmat.studies.findings import find
-from fitmat.studies.study import Study, fit_each
+from fitmat.studies.study import Study
+from fitmat.uncertainty.laplace import laplace_each
 from fitmat.uncertainty.posterior import Posterior
 
 
@@ -22,7 +23,7 @@ def posterior() -> Posterior:
     truth = fitmat.model("lambert+ggx", channels=3, kd=np.array([0.4, 0.1, 0.2]), alpha=0.3)
     angles = np.deg2rad([20, 45, 70]), np.deg2rad(np.arange(-80, 81, 10))
     made = simulate(truth, *angles, relative_noise=0.02, absolute_noise=1e-3, seed=1)
-    return fit_each(made, {"lambert+ggx": {}}, seed=0)[0]
+    return laplace_each(made, {"lambert+ggx": {}}, seed=0)[0]
 
 
 @pytest.fixture(autouse=True)

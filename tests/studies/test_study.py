@@ -143,13 +143,13 @@ def test_a_missing_second_sampler_is_said_before_any_fit(
     measurements: Measurements, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "blackjax", None)
-    monkeypatch.setattr(room, "fit_each", lambda *_, **__: pytest.fail("a fit was started"))
+    monkeypatch.setattr(room, "laplace_each", lambda *_, **__: pytest.fail("a fit was started"))
     with pytest.raises(FitmatError, match=r"blackjax, .* install it with pip install 'fitmat\[nuts\]'"):
         study(measurements, "lambert", second_opinion=True)
 
 
 def test_what_is_unknown_is_refused_before_any_fit(measurements: Measurements, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(room, "fit_each", lambda *_, **__: pytest.fail("a fit was started"))
+    monkeypatch.setattr(room, "laplace_each", lambda *_, **__: pytest.fail("a fit was started"))
     with pytest.raises(FitmatError, match="no lobe 'gxg'"):
         study(measurements, "gxg")
 
@@ -185,7 +185,7 @@ def test_of_many_models_a_few_are_examined_one_by_one(
 def test_a_second_opinion_needs_a_first(
     measurements: Measurements, monkeypatch: pytest.MonkeyPatch, told: dict[str, Any], most: int, sentence: str
 ) -> None:
-    monkeypatch.setattr(room, "fit_each", lambda *_, **__: pytest.fail("a fit was started"))
+    monkeypatch.setattr(room, "laplace_each", lambda *_, **__: pytest.fail("a fit was started"))
     monkeypatch.setattr(room, "MOST_SAMPLED", most)
     with pytest.raises(FitmatError, match=sentence):
         study(measurements, "lambert", second_opinion=True, **told)

@@ -13,6 +13,7 @@ from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.information import inverse_information, normal_equations_at
 from fitmat.fitting.likelihood import Data
 from fitmat.fitting.result import Fit
+from fitmat.maths.normal import Z95
 from fitmat.models.values import at
 from fitmat.text import brief
 
@@ -28,7 +29,7 @@ LONGEST = 0.1
 GROWTH = 3.0
 """A step is at most so many times as long as the last one, and at least as much shorter."""
 
-LEVEL = 1.959964
+LEVEL = Z95
 """√(2Δ) at the ends of a 95 % interval: 2Δ follows χ² with one degree of freedom (Wilks 1938)."""
 
 PRECISE = 1e-5

@@ -1,6 +1,6 @@
 """Kulla and Conty's compensation: a microfacet lobe that gives back the energy which single scattering loses.
 
-What returns after several facets is too little to count as diffuse light below a coat.
+It knows isotropic roughness only.
 """
 
 from typing import ClassVar

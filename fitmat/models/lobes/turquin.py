@@ -1,6 +1,6 @@
 """Turquin's compensation: a microfacet lobe scaled up by what single scattering loses towards the viewer.
 
-What returns after several facets is too little to count as diffuse light below a coat.
+It knows isotropic roughness only.
 """
 
 from collections.abc import Mapping
