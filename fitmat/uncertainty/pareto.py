@@ -11,8 +11,8 @@ from jaxtyping import Float
 
 from fitmat.models.values import slices
 
-FEWEST_IN_TAIL = 5
-"""Weights of a tail, below which nothing is fitted to it."""
+FEWEST_IN_TAIL = 6
+"""Weights of a tail, below which nothing is fitted to it: of five the lower quartile is the smallest."""
 
 PRIOR_SHAPE, PRIOR_WEIGHT = 0.5, 10.0
 """What k̂ is pulled towards, and with the weight of how many values, lest few make it jump (PSIS)."""
@@ -96,13 +96,15 @@ def _generalised_pareto(
     """Shape k and scale σ of exceedances in ascending order, by the empirical Bayes estimate of Zhang & Stephens 2009.
 
     b = −k/σ is averaged over its profile likelihood on a grid of quantiles of their prior; k = mean ln(1 − b x). The
-    shape is then shrunk towards `PRIOR_SHAPE`. Not finite where the lower quarter of the exceedances is 0.
+    shape is then shrunk towards `PRIOR_SHAPE`. Not finite where the lower quartile of the exceedances, which sets the
+    scale of that grid, is the smallest of them.
     """
     t = x.shape[1]
     size = 30 + int(np.sqrt(t))
+    quartile = x[:, int(t / 4 + 0.5) - 1]
     with np.errstate(divide="ignore", invalid="ignore"):
         grid = 1.0 - np.sqrt(size / (np.arange(1, size + 1) - 0.5))
-        b = grid / (3.0 * x[:, int(t / 4 + 0.5) - 1, None]) + 1.0 / x[:, -1:]
+        b = grid / (3.0 * np.where(quartile > x[:, 0], quartile, np.nan)[:, None]) + 1.0 / x[:, -1:]
         k = np.stack([np.log1p(-one[:, None] * x).mean(axis=1) for one in b.T], axis=1)
         profile = t * (np.log(-b / k) - k - 1.0)
         weights = np.exp(profile - profile.max(axis=1, keepdims=True))

@@ -54,8 +54,9 @@ def test_the_band_is_that_of_arviz() -> None:
     uniform = (np.arange(100) + 0.5) / 100
     z, _, lower, upper = ecdf_pit(uniform, 0.95, 4000, rng=np.random.default_rng(1))
     ours, limits = band(100, 99, 0.95)
-    np.testing.assert_allclose(ours, z)
-    np.testing.assert_allclose(limits, [lower, upper], atol=0.01 + 1e-9)
+    inside = (z > 0.0) & (z < 1.0)  # some versions add both ends
+    np.testing.assert_allclose(ours, z[inside])
+    np.testing.assert_allclose(limits, [lower[inside], upper[inside]], atol=0.01 + 1e-9)
     assert band(100, 99, 0.99)[1][1].mean() > limits[1].mean()
 
 
