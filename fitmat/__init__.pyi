@@ -46,6 +46,7 @@ from .match.imitation import imitate as imitate
 # Study
 from .studies.study import study as study
 from .studies.study import Study as Study
+from .studies.result import load as load
 
 # Report
 from .reports.page import report as report

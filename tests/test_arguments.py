@@ -292,6 +292,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             "progress": CALLED,
         },
     ),
+    "load": ({"folder": "/proc/x"}, {"folder": PATH}),
     "report": ({"study": STUDY, "folder": "/proc/x"}, {"study": NOUN, "folder": PATH, "force": FLAG}),
 }
 """Public name → arguments that are right, and for each argument what is not."""

@@ -13,6 +13,7 @@ from fitmat.fitting import priors
 from fitmat.maths import program_files, programs
 from fitmat.models.parameters import assignments
 from fitmat.reports import page, terminal
+from fitmat.studies.result import RECORD
 from fitmat.studies.sampling import forget
 from fitmat.studies.study import Study, study
 
@@ -41,7 +42,7 @@ class Report(NamedTuple):
         Args:
             as_json: Whether as the record that was written; else as a person reads it.
         """
-        record, shown = self.folder / page.RECORD, self.folder / page.PAGE
+        record, shown = self.folder / RECORD, self.folder / page.PAGE
         if as_json:
             process.say(record.read_text(encoding="utf-8").rstrip("\n"))
         else:

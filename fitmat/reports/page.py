@@ -36,6 +36,7 @@ from fitmat.models.metrics import METRICS
 from fitmat.reports.pictures import reason
 from fitmat.reports.rows import parameter_rows, prior_rows
 from fitmat.studies import record
+from fitmat.studies.result import POSTERIOR, RECORD
 from fitmat.studies.study import Study
 from fitmat.text import visible
 from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAIL_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS, Posterior
@@ -48,7 +49,7 @@ Draw = Callable[[], "Figure"]
 
 DPI = 96
 CHANNELS_DRAWN = 3
-PAGE, RECORD, POSTERIOR = "report.html", "fit.json", "posterior-{}.parquet"
+PAGE = "report.html"
 
 
 def write(folder: Path, study: Study) -> str:

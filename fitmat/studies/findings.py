@@ -20,8 +20,9 @@ from fitmat.judgement.scope import describe_scope
 from fitmat.judgement.several_facets import left_out
 from fitmat.studies.curves import Curve, predict_curves
 from fitmat.text import brief
+from fitmat.uncertainty.estimate import Quantity
 from fitmat.uncertainty.posterior import Posterior
-from fitmat.uncertainty.quantities import Quantity, derived, parameters
+from fitmat.uncertainty.quantities import derived, parameters
 from fitmat.uncertainty.second_sampler import SecondOpinion
 
 

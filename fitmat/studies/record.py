@@ -12,10 +12,11 @@ from fitmat.judgement.identifiability.verdicts import Identifiability
 from fitmat.match.appearance.spheres import Perceived, Spread
 from fitmat.match.match import Match
 from fitmat.studies.findings import Findings
+from fitmat.studies.result import FORMAT, masking
 from fitmat.studies.study import Study
 from fitmat.text import plain
-from fitmat.uncertainty.estimate import Estimate
-from fitmat.uncertainty.quantities import UNDETERMINED, Quantity
+from fitmat.uncertainty.estimate import Estimate, Quantity
+from fitmat.uncertainty.quantities import UNDETERMINED
 
 
 def to_dict(study: Study) -> dict[str, Any]:
@@ -23,6 +24,7 @@ def to_dict(study: Study) -> dict[str, Any]:
     m, first = study.measurements, study.findings[0].fit
     return plain(
         {
+            "format": FORMAT,
             "fitmat": version("fitmat"),
             "file": m.source,
             "n_samples": study.n_samples,
@@ -51,6 +53,7 @@ def _fit_dict(found: Findings) -> dict[str, Any]:
         diagnosed |= {"seed": d.seed}
     return {
         "model": fit.name,
+        "masking": masking(fit.model),
         "result": fit.result,
         "result_means": RESULTS[fit.result],
         "adequacy": fit.adequacy,

@@ -3,7 +3,6 @@
 Takes all numbers from a posterior; formats nothing.
 """
 
-import dataclasses
 from collections.abc import Collection, Sequence
 
 import numpy as np
@@ -12,41 +11,11 @@ from fitmat.fitting.coordinates import channel_names, coordinates
 from fitmat.maths.normal import Z95
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
 from fitmat.models.terms.fresnel import eta_from_f0, f0_from_eta
-from fitmat.text import brief
-from fitmat.uncertainty.estimate import limits
+from fitmat.uncertainty.estimate import Quantity, limits
 from fitmat.uncertainty.posterior import Posterior
 
 UNDETERMINED = "not determined by these angles"
 """Remark on what has an interval but no value to rely on."""
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Quantity:
-    """One reported quantity; arrays hold one entry per channel, or a single one for shared quantities.
-
-    Attributes:
-        name: Parameter name.
-        symbol: The letter of the literature.
-        unit: "1" for none.
-        doc: What it means.
-        value: Best fit, (k,).
-        sd: Standard deviation, (k,); NaN where `remarks` says why there is none.
-        ci95: 95 % interval, (k, 2).
-        per_channel: Whether the k entries are channels.
-        remarks: (k,); "" or a reason: "fixed", "at its lower bound", "not determined by these angles".
-    """
-
-    name: str
-    symbol: str
-    unit: str
-    doc: str
-    value: np.ndarray
-    sd: np.ndarray
-    ci95: np.ndarray
-    per_channel: bool
-    remarks: tuple[str, ...]
-
-    __repr__ = brief
 
 
 def parameters(posterior: Posterior, undetermined: Collection[str] = ()) -> list[Quantity]:

@@ -1,6 +1,7 @@
 """The story of one file: every number computed once, in the order of the work; an interrupt keeps what was done."""
 
 import dataclasses
+import json
 import sys
 from collections import Counter
 from pathlib import Path
@@ -13,10 +14,12 @@ import fitmat as fm
 from fitmat.errors import FitmatError
 from fitmat.measurements.large import chunks
 from fitmat.measurements.samples import Measurements
+from fitmat.models.parameters import vector
 from fitmat.models.simulation import simulate
 from fitmat.reports import page, terminal
 from fitmat.studies import findings, record
 from fitmat.studies import study as room
+from fitmat.studies.result import POSTERIOR, RECORD, load
 from fitmat.studies.sampling import forget
 from fitmat.studies.study import DETAILED, Study, judge, study
 from fitmat.uncertainty.posterior import Posterior
@@ -51,6 +54,23 @@ def test_a_study_holds_one_noun_for_each_model(studied: Study, measurements: Mea
         assert [q.name for q in found.parameters] == [*(e.name for e in found.fit.entries), "discrepancy"]
         assert [learnt.name for learnt in found.learnt] == list(found.fit.coordinates.names)
         assert found.residuals.shape == found.fit.data.x.shape
+
+
+def test_what_is_written_is_read_back(studied: Study, tmp_path: Path) -> None:
+    """Every model with its values, intervals and draws; which of them the data prefer."""
+    (tmp_path / RECORD).write_text(json.dumps(record.to_dict(studied)), encoding="utf-8")
+    for posterior in studied.posteriors:
+        posterior.save(tmp_path / POSTERIOR.format(posterior.fit.name))
+    result = load(tmp_path)
+    for one, found in zip(result.fits, studied.findings, strict=True):
+        assert one.name == found.name
+        assert np.array_equal(vector(one.model), found.fit.values)
+        assert np.array_equal(one.draws, found.posterior.values)
+        assert [q.name for q in one.parameters] == [q.name for q in found.parameters]
+        for read, told in zip(one.parameters, found.parameters, strict=True):
+            assert np.array_equal(read.ci95, told.ci95, equal_nan=True)
+    assert studied.choice is not None
+    assert result.fitted().name == studied.choice.best.name
 
 
 def test_every_row_is_reported_where_some_are_shown(

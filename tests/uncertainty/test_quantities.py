@@ -8,8 +8,9 @@ import pytest
 
 import fitmat as fm
 from fitmat.fitting.result import Fit
+from fitmat.uncertainty.estimate import Quantity
 from fitmat.uncertainty.posterior import Posterior
-from fitmat.uncertainty.quantities import Quantity, derived, parameters
+from fitmat.uncertainty.quantities import derived, parameters
 
 INTERPOLATION = 1e-3
 """Relative; a quantile between two draws of 2000, taken before or after a smooth change of variable."""
