@@ -198,10 +198,6 @@ class Ablated(AbstractBRDF):
         """Where the whole model is."""
         return self.within.isotropic
 
-    def diffuse_albedo(self) -> Spectrum:
-        """That of the whole model."""
-        return self.within.diffuse_albedo()
-
 
 def ablate(empirical: AbstractBRDF, microfacet: AbstractBRDF, draws: PairedDraws) -> Ablation | None:
     """How far the distance falls when the microfacet model loses its terms; None where it has none to lose.

@@ -63,10 +63,6 @@ class AbstractBRDF(eqx.Module):
         del wi
         return jnp.zeros(())
 
-    @abstractmethod
-    def diffuse_albedo(self) -> Spectrum:
-        """Albedo of what leaves in all directions alike, in [0, 1], for light from everywhere."""
-
 
 class AbstractShape(eqx.Module):
     """How wide a lobe is, and along which axes.
@@ -106,10 +102,6 @@ class AbstractLobe(AbstractBRDF):
 
 class AbstractSpecular(AbstractLobe):
     """A lobe around one direction, without diffuse light."""
-
-    def diffuse_albedo(self) -> Spectrum:
-        """0."""
-        return jnp.zeros(())
 
 
 class AbstractDiffuse(AbstractLobe):
@@ -151,10 +143,6 @@ class Sum(AbstractBRDF):
     def mirror(self, wi: Vec3) -> Spectrum:
         """The sum over the lobes."""
         return sum((lobe.mirror(wi) for lobe in self.lobes[1:]), self.lobes[0].mirror(wi))
-
-    def diffuse_albedo(self) -> Spectrum:
-        """The sum over the lobes, at most 1."""
-        return jnp.minimum(sum((lobe.diffuse_albedo() for lobe in self.lobes[1:]), self.lobes[0].diffuse_albedo()), 1.0)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -85,10 +85,6 @@ class Walked(AbstractEstimated):
         """Where the other lobes are."""
         return self.rest is None or self.rest.isotropic
 
-    def diffuse_albedo(self) -> Spectrum:
-        """That of the other lobes."""
-        return jnp.zeros(()) if self.rest is None else self.rest.diffuse_albedo()
-
     @property
     def surface(self) -> Surface:
         """What light walks on, without ks; for `fitmat.albedo_walk`."""

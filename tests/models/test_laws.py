@@ -128,9 +128,6 @@ class Planted(AbstractBRDF):
     def isotropic(self) -> bool:
         return True
 
-    def diffuse_albedo(self) -> Spectrum:
-        return self.kd
-
 
 @pytest.mark.parametrize(
     ("fault", "law"),

@@ -40,7 +40,10 @@ def run(tmp_path: Path) -> Path:
 def test_a_result_is_what_was_written(tmp_path: Path) -> None:
     """Models, values, intervals and draws; of the material, not of the instrument, whose scale is not certain."""
     names = ("lambert", "tilt-over-ggx")
-    truth, angles = fm.model("lambert", kd=np.array([0.3, 0.1])), (np.deg2rad([20, 45, 70]), np.deg2rad(np.arange(-80, 81, 20)))
+    truth, angles = (
+        fm.model("lambert", kd=np.array([0.3, 0.1])),
+        (np.deg2rad([20, 45, 70]), np.deg2rad(np.arange(-80, 81, 20))),
+    )
     instrument = fm.Instrument(calibration=0.03)
     told: dict[str, Any] = {"relative_noise": 0.02, "absolute_noise": 1e-3, "seed": 1, "instrument": instrument}
     options: dict[str, Any] = {"masking": "separable", "fixed": {"ks": 1.0}, "sampling": False}

@@ -176,7 +176,3 @@ class Varnish(AbstractBRDF):
     def isotropic(self) -> bool:
         """Where the base is."""
         return self.base.isotropic
-
-    def diffuse_albedo(self) -> Spectrum:
-        """At most that of the base."""
-        return self.base.diffuse_albedo()

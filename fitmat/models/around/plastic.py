@@ -69,7 +69,3 @@ class Plastic(AbstractLobe):
     def width(self) -> Scalar:
         """Alpha itself."""
         return self.alpha
-
-    def diffuse_albedo(self) -> Spectrum:
-        """That of the body."""
-        return self.kd

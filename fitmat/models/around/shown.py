@@ -42,10 +42,6 @@ class AbstractShown(AbstractBRDF):
         """That of the base."""
         return self.base.mirror(wi)
 
-    def diffuse_albedo(self) -> Spectrum:
-        """That of the base."""
-        return self.base.diffuse_albedo()
-
 
 def surface(model: AbstractBRDF) -> AbstractBRDF:
     """The material itself: without what the instrument and the mount do to its measurement."""

@@ -123,10 +123,6 @@ class AshikhminShirley(AbstractLobe):
         """√(2/(n+2)) of the larger exponent n: the α of the microfacet lobe with the same curvature at its peak."""
         return jnp.minimum(jnp.sqrt(2.0 / (jnp.maximum(*self.exponents.along) + 2.0)), 1.0)
 
-    def diffuse_albedo(self) -> Spectrum:
-        """(23/28) kd (1 − F0): what the diffuse term reflects of light that comes evenly from all directions."""
-        return 23.0 / 28.0 * self.kd * (1.0 - self.fresnel.normal_reflectance())
-
 
 def _entering(cos: Scalar) -> Scalar:
     """1 − (1 − c/2)⁵."""

@@ -105,10 +105,6 @@ class Disney2012(AbstractLobe):
         """The smaller slope, or the coat's alpha where that is smaller."""
         return narrowest(self.shape, self.coat)
 
-    def diffuse_albedo(self) -> Spectrum:
-        """base_color (1 − metallic), at normal incidence nearly."""
-        return self.base_color * (1.0 - self.metallic)
-
 
 def diffuse(p: Pair, roughness: Scalar) -> Scalar:
     """Burley's diffuse lobe times π: (1 + (F90 − 1) F_i)(1 + (F90 − 1) F_o), F90 = ½ + 2 r c_d² (2012, sec. 5.3)."""

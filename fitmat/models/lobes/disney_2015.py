@@ -100,10 +100,6 @@ class Disney2015(AbstractLobe):
         """The smaller slope, or the coat's alpha where that is smaller."""
         return narrowest(self.shape, self.coat)
 
-    def diffuse_albedo(self) -> Spectrum:
-        """base_color (1 − metallic), at normal incidence nearly."""
-        return self.base_color * (1.0 - self.metallic)
-
 
 def lambert(p: Pair) -> Scalar:
     """(1 − ½F_i)(1 − ½F_o): Lambert's lobe, times π, behind the surface (Burley 2015, eq. 4)."""

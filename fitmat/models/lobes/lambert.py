@@ -33,7 +33,3 @@ class Lambert(AbstractDiffuse):
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """kd/π."""
         return jnp.where(above(wi, wo), self.kd / jnp.pi, 0.0)
-
-    def diffuse_albedo(self) -> Spectrum:
-        """The parameter itself."""
-        return self.kd

@@ -14,12 +14,6 @@ from fitmat.maths.directions import COS_MIN, above
 from fitmat.models.base import AbstractDiffuse
 from fitmat.models.parameters import param
 
-MEAN_B = 2.0 / 3.0 - 64.0 / (45.0 * jnp.pi)
-"""Hemispherical albedo of max(0, cosΔφ) sinα tanβ/π, from Portsmouth, Kutz & Hill's average of s/t."""
-
-MEAN_FULL = 0.027764286107928395
-"""That of −[cosΔφ < 0] 0.45 cosΔφ tanβ (2β/π)³ + (1 − |cosΔφ|) ⅛(4αβ/π²)² tan((α+β)/2), over π; a number."""
-
 C1_FON = 0.5 - 2.0 / (3.0 * jnp.pi)
 C2_FON = 2.0 / 3.0 - 28.0 / (15.0 * jnp.pi)
 """Portsmouth, Kutz & Hill's constants: the albedo of Fujii's s/t at grazing incidence, and its average."""
@@ -77,11 +71,6 @@ class OrenNayar(AbstractDiffuse):
         variance = jnp.deg2rad(self.sigma_n) ** 2
         return 1.0 - 0.5 * variance / (variance + 0.33), 0.45 * variance / (variance + 0.09)
 
-    def diffuse_albedo(self) -> Spectrum:
-        """kd (A + B (2/3 − 64/(45π))), the exact hemispherical albedo."""
-        a, b = self._coefficients()
-        return self.kd * (a + b * MEAN_B)
-
 
 class OrenNayarFull(AbstractDiffuse):
     """Oren & Nayar 1994, the full functional approximation with interreflection.
@@ -118,12 +107,6 @@ class OrenNayarFull(AbstractDiffuse):
         """kd/π (L1 + 0.17 kd L2), at least 0."""
         once, twice = _direct(wi, wo, self.sigma_n), _interreflected(wi, wo, self.sigma_n)
         return jnp.where(above(wi, wo), self.kd / jnp.pi * jnp.maximum(once + 0.17 * self.kd * twice, 0.0), 0.0)
-
-    def diffuse_albedo(self) -> Spectrum:
-        """The hemispherical albedo, but for the cut: cosΔφ averages out, and σ is a factor of what stays."""
-        variance = jnp.deg2rad(self.sigma_n) ** 2
-        once = 1.0 - 0.5 * variance / (variance + 0.33) + MEAN_FULL * variance / (variance + 0.09)
-        return self.kd * (once + 0.17 * self.kd * variance / (variance + 0.13))
 
 
 class EnergyPreservingOrenNayar(AbstractDiffuse):
@@ -170,10 +153,6 @@ class EnergyPreservingOrenNayar(AbstractDiffuse):
         """kd_ms."""
         mean = self._average()
         return self.kd**2 * mean / (1.0 - self.kd * (1.0 - mean))
-
-    def diffuse_albedo(self) -> Spectrum:
-        """kd Ē + kd_ms (1 − Ē), the exact hemispherical albedo."""
-        return self.kd * self._average() + self._multiple() * (1.0 - self._average())
 
 
 def _shadow(wi: Vec3, wo: Vec3) -> Scalar:
