@@ -45,6 +45,7 @@ class Coordinates:
         weights: Which of the k, by position, the scale multiplies; empty where no scale is fitted.
         scale: Position of ln g among the k; 0 where there is none.
         names: Of the parameters, with their channel where there are several.
+        periods: After which a parameter is the same again; 0 where there is no such.
     """
 
     places: tuple[int, ...]
@@ -54,6 +55,7 @@ class Coordinates:
     weights: tuple[int, ...] = ()
     scale: int = 0
     names: tuple[str, ...] = dataclasses.field(default=(), compare=False)
+    periods: tuple[float, ...] = dataclasses.field(default=(), compare=False)
 
     @property
     def count(self) -> int:
@@ -84,6 +86,27 @@ class Coordinates:
     def span(self) -> Float[np.ndarray, " k"]:
         """Widths of the bounds, natural."""
         return self.high - self.low
+
+    @property
+    def extent(self) -> Float[np.ndarray, " k"]:
+        """How far apart, natural, two values can be that are not the same: the width of the bounds, or a period."""
+        return np.where(self._turn > 0, self._turn, self.span)
+
+    @property
+    def _turn(self) -> Float[np.ndarray, " k"]:
+        return np.array(self.periods or (0.0,) * self.count, float)
+
+    def around(self, centre: Float[np.ndarray, " k"]) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
+        """Bounds, natural, as seen from a point: half a period on either side of what is periodic."""
+        turn = self._turn
+        return np.where(turn > 0, centre - turn / 2, self.low), np.where(turn > 0, centre + turn / 2, self.high)
+
+    def near(self, values: Float[np.ndarray, "... p"], centre: Float[np.ndarray, " p"]) -> Float[np.ndarray, "... p"]:
+        """Parameter vectors with what is periodic moved by whole periods, to within half of one of a vector's."""
+        turn, found = self._turn, np.array(values)
+        apart = np.asarray(values)[..., self.index] - np.asarray(centre)[self.index]
+        found[..., self.index] -= turn * np.round(apart / np.where(turn > 0, turn, 1.0))
+        return found
 
     def _to_natural(self, chosen: Numbers) -> Numbers:
         xp = library(chosen)
@@ -185,6 +208,7 @@ def coordinates(
         upper=tuple(p.upper for p, _ in each),
         log=tuple(p.scale == "log" for p, _ in each),
         names=tuple(name for e in kept for name in channel_names(e, channels)),
+        periods=tuple(p.period for p, _ in each),
     )
 
 

@@ -117,7 +117,7 @@ def _known(
     information: np.ndarray, moved: Coordinates, inside: np.ndarray
 ) -> tuple[Float[np.ndarray, "i i"], Float[np.ndarray, "i i"]]:
     """H of what lies on no bound, the flat prior counted with the variance of its range, and H's Cholesky factor."""
-    span, free = moved.span[inside], moved.index[inside]
+    span, free = moved.extent[inside], moved.index[inside]
     known = information[np.ix_(free, free)] + np.diag(12.0 / span**2)
     unit = np.sqrt(np.abs(np.diagonal(known)))
     w, v = np.linalg.eigh(known / np.outer(unit, unit))

@@ -149,7 +149,7 @@ def covariance(
     values, free, span = np.asarray(vector(best)), moved.index, moved.span
     known = information[np.ix_(free, free)]
     released = inverse_information(known, span)
-    limit = np.where(moved.ratio, UNDETERMINED["log"], UNDETERMINED["linear"] * span)
+    limit = np.where(moved.ratio, UNDETERMINED["log"], UNDETERMINED["linear"] * moved.extent)
     apart = released if not told.any() else inverse_information(known[np.ix_(~told, ~told)], span[~told])
     loose = set(free[~told][~(np.sqrt(np.diagonal(apart)) <= limit[~told])])
     inside = moved.side(values) == 0

@@ -139,7 +139,7 @@ def assignments(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
 
 def natural_sd(model: AbstractBRDF, prior: Prior | None) -> Float[np.ndarray, " p"]:
     """Prior standard deviation of every natural coordinate; that of a flat prior is its range / √12."""
-    flat = coordinates(model).span / np.sqrt(12.0)
+    flat = coordinates(model).extent / np.sqrt(12.0)
     if prior is None:
         return flat
     precision = np.asarray(prior.precision)

@@ -6,16 +6,18 @@ Finds nothing itself; `fitting` does.
 import dataclasses
 import functools
 import math
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
 from fitmat.fitting.coordinates import Coordinates, coordinates
 from fitmat.fitting.correlation import Correlation, correlate
-from fitmat.fitting.information import FOLLOWS, MISSES, covariance, information
+from fitmat.fitting.ends import AGREE, AS_GOOD, Ends, behind, home
+from fitmat.fitting.information import FOLLOWS, MISSES, covariance, information, inverse_information
 from fitmat.fitting.likelihood import Data, best_discrepancy, first_discrepancy
 from fitmat.fitting.losses import DEFAULT, Loss
+from fitmat.fitting.symmetries import nearest
+from fitmat.maths.normal import Z95
 from fitmat.maths.programs import program
 from fitmat.measurements.noise import Noise
 from fitmat.measurements.samples import Measurements
@@ -23,9 +25,6 @@ from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import Entry, entries, vector, with_vector
 from fitmat.models.values import at
 from fitmat.text import brief, html_table, text_table, with_error
-
-AGREE = 0.1
-"""Starts whose log-likelihood is within this of the best have found the same optimum."""
 
 RESULTS = {
     "converged": "Converged.",
@@ -64,6 +63,7 @@ class Fit:
         n_values: Values that were fitted; more than `measurements` holds where these are a part of a large file.
         misfit: The same spread of ∛(f cosθ_i) by the default likelihood, whatever the loss.
         discrepancy_sd: Standard deviation of s where it is known from all values of a large file; else None.
+        rivals: Other ends of starts that are as good, in the form that is nearest to the best, (m, p).
     """
 
     name: str
@@ -84,6 +84,7 @@ class Fit:
     n_values: int
     misfit: float
     discrepancy_sd: float | None = None
+    rivals: Float[np.ndarray, "m p"] = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
 
     __repr__ = brief
 
@@ -132,6 +133,22 @@ class Fit:
         centre = moved.natural(self.values)
         away = (moved.natural(values) - centre) @ self.correlation.stretch.T
         return moved.filled(self.values, moved.folded(centre + away))
+
+    @functools.cached_property
+    def elsewhere(self) -> dict[str, tuple[float, ...]]:
+        """Names of fitted parameters, with their channel where there are several → values of optima as good.
+
+        Only those that lie outside of the 95 % interval that the curvature at the best fit promises.
+        """
+        moved = self.coordinates
+        if not (self.finite and len(self.rivals) and moved.count):
+            return {}
+        known = self.information[np.ix_(self.free, self.free)] + np.diag(12.0 / moved.extent**2)
+        stretch = self.correlation.stretch
+        sd = np.sqrt(np.diagonal(stretch @ inverse_information(known, moved.span) @ stretch.T))
+        away = np.abs(moved.natural(self.rivals) - moved.natural(self.values)) > Z95 * sd
+        found = zip(moved.names, moved.places, away.T, strict=True)
+        return {name: tuple(self.rivals[outside, k].tolist()) for name, k, outside in found if outside.any()}
 
     @functools.cached_property
     def on_bound(self) -> dict[str, str]:
@@ -212,16 +229,6 @@ class Fit:
         return self.n_inferred * np.log(self.n_values) - 2 * self.log_likelihood
 
 
-class Ends(NamedTuple):
-    """Where k starts ended; every array begins with k."""
-
-    values: np.ndarray
-    discrepancy: np.ndarray
-    log_likelihood: np.ndarray
-    solved: np.ndarray
-    steps: np.ndarray
-
-
 def conclude(
     m: Measurements,
     template: AbstractBRDF,
@@ -231,15 +238,17 @@ def conclude(
 ) -> Fit:
     """Choose the best end, compute the covariance and classify."""
     found_noise, data = given
-    usable = np.isfinite(ends.log_likelihood) & np.isfinite(ends.values).all(axis=1)
-    scores = np.where(usable, ends.log_likelihood, -np.inf)
-    k = int(np.argmax(scores))
-    best = with_vector(template, ends.values[k])
-    s = float(ends.discrepancy[k])
+    apart = behind(ends, data)
+    k = int(np.argmin(apart))
+    usable = bool(np.isfinite(apart[k]))
     moved = coordinates(template, held)
-    on_bound = bool(moved.side(np.asarray(ends.values[k])).any())
+    values = home(data, moved, ends.values[k])
+    best = with_vector(template, values)
+    s = float(ends.discrepancy[k])
+    on_bound = bool(moved.side(values).any())
     known = information(best, data, s, moved.index)
     spread, undetermined = covariance(best, known, moved, data.told(moved.index))
+    others = ends.values[(apart < AS_GOOD) & (np.arange(len(apart)) != k)]
     return Fit(
         name=template.name,
         model=best,
@@ -248,16 +257,17 @@ def conclude(
         data=data,
         discrepancy=s,
         held=held,
-        result=named_outcome(bool(usable[k]), bool(ends.solved[k]), on_bound, undetermined),
+        result=named_outcome(usable, bool(ends.solved[k]), on_bound, undetermined),
         steps=int(ends.steps[k]),
-        n_starts=len(scores),
-        n_starts_agreeing=int(np.count_nonzero(scores > scores[k] - AGREE)) if usable[k] else 0,
+        n_starts=len(apart),
+        n_starts_agreeing=int(np.count_nonzero(apart < AGREE)),
         log_likelihood=float(ends.log_likelihood[k]),
         information=known,
         likelihood_covariance=spread,
         undetermined=undetermined,
         n_values=int(np.count_nonzero(data.weight)),
         misfit=s if data.loss.infers_discrepancy else _misfit(best, data),
+        rivals=nearest(best, others, moved),
     )
 
 

@@ -8,8 +8,8 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.fitting.fitting import optima
 from fitmat.fitting.likelihood import misfits
+from fitmat.fitting.refining import optima
 from fitmat.fitting.result import Fit
 from fitmat.judgement.prediction import predictions
 from fitmat.measurements.incidences import incidences

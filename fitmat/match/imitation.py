@@ -17,7 +17,7 @@ from jaxtyping import Array, ArrayLike, Float
 from fitmat import arguments
 from fitmat.errors import FitmatError
 from fitmat.fitting.coordinates import Coordinates, coordinates
-from fitmat.fitting.fitting import STEADY
+from fitmat.fitting.refining import STEADY
 from fitmat.fitting.result import Fit
 from fitmat.fitting.starts import nonnegative
 from fitmat.match.distances import direction_weight, incidence_weight, lobe_rules

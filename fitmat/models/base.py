@@ -70,10 +70,12 @@ class AbstractShape(eqx.Module):
     Attributes:
         suffix: What it adds to the lobe's name.
         isotropic: Whether it is the same along all axes.
+        exchanged: The two fields that a quarter turn of its `rotation` exchanges, where there are such.
     """
 
     suffix: ClassVar[str]
     isotropic: ClassVar[bool]
+    exchanged: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
     def local(self, w: Vec3) -> Vec3:

@@ -34,6 +34,8 @@ class Param:
         weight: True where the BRDF is proportional to it (kd, ks): solved linearly in the start grid.
         starts: Values tried in the start grid; empty for weights.
         doc: What it means, in a few words.
+        period: Values that differ by it are the same surface; 0 where there is none. The range holds two of them, so
+            that half of one on either side of (−period/2, period/2] lies within it.
     """
 
     lower: float
@@ -45,6 +47,7 @@ class Param:
     weight: bool
     starts: tuple[float, ...]
     doc: str
+    period: float = 0.0
 
 
 def param(
@@ -58,11 +61,12 @@ def param(
     per_channel: bool = False,
     weight: bool = False,
     starts: tuple[float, ...] = (),
+    period: float = 0.0,
     default: float | None = None,
     optional: bool = False,
 ) -> Any:
     """Declare a model field as a parameter; see `Param` for the arguments; an optional one may be None."""
-    meta = Param(lower, upper, symbol, unit, scale, per_channel, weight, starts, doc)
+    meta = Param(lower, upper, symbol, unit, scale, per_channel, weight, starts, doc, period)
     extra: dict[str, Any] = {} if default is None and not optional else {"default": default}
     return eqx.field(converter=_as_optional if optional else as_parameter, metadata={"param": meta}, **extra)
 

@@ -74,10 +74,13 @@ def log_density_at(template: AbstractBRDF, data: Data, moved: Coordinates, x: Ar
 
 
 def physical(fit: Fit, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sampled coordinates (m, free + 1) to full physical vectors (m, p) and discrepancies (m,)."""
+    """Sampled coordinates (m, free + 1) to full physical vectors (m, p) and discrepancies (m,).
+
+    What is periodic lies within half a period of the best fit.
+    """
     moved = sampled(fit)
     natural = moved.unscaled(coordinates)
-    return moved.filled(fit.values, natural[:, :-1]), _inferred(fit.data, natural[:, -1])
+    return moved.near(moved.filled(fit.values, natural[:, :-1]), fit.values), _inferred(fit.data, natural[:, -1])
 
 
 def _inferred(data: Data, s: Any) -> Any:

@@ -121,7 +121,7 @@ def gaussian(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     span, centre = moved.span, np.append(moved.natural(fit.values), fit.discrepancy)
     covariance = np.zeros((len(centre),) * 2)
     # The flat prior counts with the variance of its range: a direction that no datum determines is no wider than it.
-    information = fit.information[np.ix_(free, free)] + np.diag(12.0 / span**2)
+    information = fit.information[np.ix_(free, free)] + np.diag(12.0 / moved.extent**2)
     covariance[:-1, :-1] = inverse_information(information, span)
     covariance[-1, -1] = _discrepancy_sd(fit) ** 2
     return scaled_gaussian(moved, centre, covariance)

@@ -8,6 +8,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from fitmat.fitting.coordinates import channel_names, coordinates
+from fitmat.fitting.result import Fit
 from fitmat.maths.normal import Z95
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
 from fitmat.models.terms.fresnel import eta_from_f0, f0_from_eta
@@ -16,6 +17,9 @@ from fitmat.uncertainty.posterior import Posterior
 
 UNDETERMINED = "not determined by these angles"
 """Remark on what has an interval but no value to rely on."""
+
+SEVERAL = "another optimum fits as well"
+"""Remark on what has several values, which its interval holds, and none to rely on."""
 
 
 def parameters(posterior: Posterior, undetermined: Collection[str] = ()) -> list[Quantity]:
@@ -37,6 +41,10 @@ def parameters(posterior: Posterior, undetermined: Collection[str] = ()) -> list
     ci95 = posterior.interval() if sampled else _laplace_interval(posterior, sd)
     every = coordinates(fit.model)
     sure = np.where(every.side(fit.values) != 0, np.nan, sd)
+    for name, place in zip(fit.coordinates.names, fit.coordinates.places, strict=True):
+        others = fit.elsewhere.get(name, ())
+        ci95[place] = min(ci95[place, 0], *others, np.inf), max(ci95[place, 1], *others, -np.inf)
+        sure[place] = np.nan if others else sure[place]
     result = []
     for entry in fit.entries:
         held, p = entry.name in fit.held, entry.param
@@ -51,10 +59,16 @@ def parameters(posterior: Posterior, undetermined: Collection[str] = ()) -> list
             Quantity(
                 *(entry.name, p.symbol, p.unit, p.doc, fit.values[entry.place], given, ci95[entry.place]),
                 per_channel=bool(entry.shape),
-                remarks=tuple(UNDETERMINED if name in undetermined else remark for name in names),
+                remarks=tuple(_remark(fit, name, remark, undetermined) for name in names),
             )
         )
     return [*result, _discrepancy(posterior)] if fit.loss.infers_discrepancy else result
+
+
+def _remark(fit: Fit, name: str, remark: str, undetermined: Collection[str]) -> str:
+    if name in undetermined:
+        return UNDETERMINED
+    return SEVERAL if name in fit.elsewhere and remark != UNDETERMINED else remark
 
 
 def _discrepancy(posterior: Posterior) -> Quantity:
@@ -75,7 +89,9 @@ def _laplace_interval(posterior: Posterior, sd: np.ndarray) -> np.ndarray:
         ratio = np.exp(Z95 * sd / every.slope(v))
         low = np.where(every.ratio, v / ratio, v - Z95 * sd)
         high = np.where(every.ratio, v * ratio, v + Z95 * sd)
-    return np.stack([np.maximum(low, every.lower), np.minimum(high, every.upper)], axis=1)
+    ends = zip(every.around(every.natural(v)), (every.lower, every.upper), strict=True)
+    least, most = (np.where(every.ratio, bound, seen) for seen, bound in ends)
+    return np.stack([np.maximum(low, least), np.minimum(high, most)], axis=1)
 
 
 def derived(posterior: Posterior, fitted: Sequence[Quantity]) -> list[Quantity]:
@@ -86,7 +102,8 @@ def derived(posterior: Posterior, fitted: Sequence[Quantity]) -> list[Quantity]:
     """
     fit = posterior.fit
     names = {e.name: e for e in fit.entries}
-    draws = np.vstack([fit.values, posterior.values])
+    some = fit.rivals if fit.elsewhere else fit.rivals[:0].reshape(0, len(fit.values))
+    draws = np.vstack([fit.values, some, posterior.values])
 
     def of(name: str) -> np.ndarray:
         return draws[:, names[name].place]

@@ -114,7 +114,7 @@ def _information(
 def _verdicts(truth: AbstractBRDF, gloss: str, information: np.ndarray) -> list[Prospect]:
     every, values = coordinates(truth), np.asarray(vector(truth))
     sd = np.sqrt(np.diagonal(inverse_information(information, every.span)))
-    loose = ~(sd <= np.where(every.ratio, UNDETERMINED["log"], UNDETERMINED["linear"] * every.span))
+    loose = ~(sd <= np.where(every.ratio, UNDETERMINED["log"], UNDETERMINED["linear"] * every.extent))
     relative = sd / np.where(every.ratio, 1.0, values)
     found = []
     for entry in entries(truth):

@@ -79,6 +79,11 @@ class Profile:
     __repr__ = brief
 
     @property
+    def missed(self) -> float:
+        """By how many nats a point of it is better than the fit; 0 where the fit is the best."""
+        return max(-float(self.points.rise.min()), 0.0)
+
+    @property
     def sd(self) -> float:
         """The width of the 95 % interval over that of a Gaussian of standard deviation 1, natural."""
         return (self.interval[1] - self.interval[0]) / (2 * LEVEL)
@@ -102,7 +107,7 @@ def profiles(fit: Fit, *, widened: bool = True) -> tuple[Profile, ...]:
     if not len(fit.free) or not fit.finite:
         return ()
     moved, surface = fit.coordinates, _Surface(fit, widened)
-    low, high, span, best = moved.low, moved.high, moved.span, surface.best
+    low, high, span, best = surface.low, surface.high, moved.span, surface.best
     held = np.repeat(np.arange(moved.count), 2)
     sign, each = np.tile([-1.0, 1.0], moved.count), np.arange(2 * moved.count)
     known = surface.gram
@@ -156,18 +161,21 @@ class _Surface:
 
     Attributes:
         best: The fit's own, kept within the bounds, (f,).
+        low: Bounds as seen from there, (f,).
+        high: The others.
         gram: JᵀJ there, (f, f).
     """
 
     def __init__(self, fit: Fit, widened: bool) -> None:
         self._fit, self._data, self._moved = fit, representative(fit), fit.coordinates
         self.best = np.clip(self._moved.natural(fit.values), self._moved.low, self._moved.high)
+        self.low, self.high = self._moved.around(self.best)
         self._back = np.linalg.inv(fit.correlation.stretch) if widened else np.eye(self._moved.count)
         square, _, gram = self._at(self.best[None])
         self._square, self.gram = square[0], gram[0]
 
     def _at(self, t: Float[np.ndarray, "m f"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        t = np.clip(self.best + (t - self.best) @ self._back.T, self._moved.low, self._moved.high)
+        t = np.clip(self.best + (t - self.best) @ self._back.T, self.low, self.high)
         values, free = self._moved.filled(self._fit.values, t), self._fit.free
         natural = coordinates(self._fit.model).natural(values)
         square, slope, gram = normal_equations_at(self._fit.model, self._data, natural, self._fit.discrepancy)
@@ -179,7 +187,7 @@ class _Surface:
         Levenberg–Marquardt for all points together, projected onto the bounds (Bertsekas 1982).
         """
         each, span = np.arange(len(t)), self._moved.span
-        low, high = self._moved.low, self._moved.high
+        low, high = self.low, self.high
         square, slope, gram = self._at(t)
         damping, moving = np.full(len(t), 1e-6), np.ones(len(t), bool)
         for _ in range(MOST_ITERATIONS):
@@ -251,17 +259,19 @@ def _tangents(known: Float[np.ndarray, "m f f"], held: np.ndarray, span: np.ndar
 def _interval(
     at: np.ndarray, rise: np.ndarray, centre: int, bounds: tuple[float, float]
 ) -> tuple[tuple[float, float], tuple[bool, bool]]:
-    """Where √(2Δ) crosses `LEVEL` on either side, by linear interpolation; the bound where it does not."""
+    """Where √(2Δ) crosses `LEVEL` last on either side, by linear interpolation; the bound where it does not.
+
+    Δ counts from the lowest point, which lies apart from the best fit where that was missed; both are inside.
+    """
     root = np.sqrt(2.0 * np.maximum(rise - rise.min(), 0.0))
+    inside = np.union1d(np.flatnonzero(root <= LEVEL), centre)
     limits, opened = [], []
-    for side, bound in ((slice(centre, None, -1), bounds[0]), (slice(centre, None), bounds[1])):
-        x, r = at[side], root[side]
-        beyond = np.flatnonzero(r > LEVEL)
-        opened.append(len(beyond) == 0)
-        if len(beyond) == 0 or beyond[0] == 0:
-            limits.append(float(bound if len(beyond) == 0 else x[0]))
+    for last, step, bound in ((inside[0], -1, bounds[0]), (inside[-1], 1, bounds[1])):
+        beyond = last + step
+        opened.append(not 0 <= beyond < len(at))
+        if opened[-1]:
+            limits.append(float(bound))
             continue
-        j = beyond[0]
-        part = (LEVEL - r[j - 1]) / (r[j] - r[j - 1])
-        limits.append(float(x[j - 1] + part * (x[j] - x[j - 1])))
+        part = max(LEVEL - root[last], 0.0) / (root[beyond] - root[last]) if root[beyond] > root[last] else 0.0
+        limits.append(float(at[last] + part * (at[beyond] - at[last])))
     return (limits[0], limits[1]), (opened[0], opened[1])

@@ -10,10 +10,11 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat import arguments
+from fitmat.fitting.ends import AGREE
 from fitmat.fitting.information import UNDETERMINED
 from fitmat.fitting.priors import natural_sd
 from fitmat.fitting.result import Fit
-from fitmat.judgement.identifiability.profiles import Profile, profiles
+from fitmat.judgement.identifiability.profiles import LEVEL, Profile, profiles
 from fitmat.judgement.identifiability.ridge import Ridge, ridge
 from fitmat.judgement.identifiability.trade_offs import Group, groups
 from fitmat.text import brief, html_table, interval, text_table, with_error
@@ -50,6 +51,7 @@ class Verdict:
         profile: Its likelihood.
         ci95: 95 % limits of the profile likelihood, physical; a bound where it is open.
         open: Which of them are bounds.
+        elsewhere: Values of other optima that are as good, outside of what the curvature at the best fit promises.
         contraction: 1 − var_post/var_prior in natural coordinates; of a ridge that fills its bounds unevenly, the
             prior's volume may contract it though no datum does, which is why the profile is asked as well.
     """
@@ -61,6 +63,7 @@ class Verdict:
     profile: Profile
     ci95: tuple[float, float]
     open: tuple[bool, bool]
+    elsewhere: tuple[float, ...]
     contraction: float
 
     __repr__ = brief
@@ -116,7 +119,24 @@ class Identifiability:
             names = [v.name for v in self.verdicts if v.state == state]
             if names:
                 parts.append(f"{_listed(names)} {'is' if len(names) == 1 else 'are'} {state}.")
-        return " ".join([*parts, *(self._traded(g) for g in self.groups)])
+        return " ".join([*parts, *self._several(), *(self._traded(g) for g in self.groups)])
+
+    def _several(self) -> list[str]:
+        """Other optima: those of other starts, and one that only a profile came upon."""
+        found = [f"{v.name} = {v.elsewhere[0]:.3g}" for v in self.verdicts if v.elsewhere and v.state != STATES[2]]
+        words = []
+        if found:
+            words.append(
+                f"Another optimum fits as well, with {_listed(found)}: the data do not tell which is right, and the "
+                "intervals hold both."
+            )
+        if (missed := max(v.profile.missed for v in self.verdicts)) > AGREE:
+            name = max(self.verdicts, key=lambda v: v.profile.missed).name
+            words.append(
+                f"The best fit was missed: with another {name} the data are followed better (by {missed:.2g} in ln L). "
+                "Fix what the angles do not determine."
+            )
+        return words
 
     def _traded(self, group: Group) -> str:
         names = _listed(list(group.names))
@@ -157,8 +177,9 @@ def identify(posterior: Posterior) -> Identifiability:
 
     A parameter is not determined where the fit says so, its profile likelihood leaves it more room than `UNDETERMINED`
     or than `CONTRACTED` of its prior, or its posterior is not narrower than that; else weakly where it is known to no
-    better than a tenth. Draws are those of the chain where it is usable, else those of the `ridge`: Laplace's would
-    leave a bent ridge, and a chain that did not mix has not seen all of it.
+    better than a tenth, or where starts that ended elsewhere fit as well. Draws are those of the chain where it is
+    usable, else those of the `ridge`: Laplace's would leave a bent ridge, and a chain that did not mix has not seen all
+    of it.
 
     Args:
         posterior: Of the fit.
@@ -188,19 +209,21 @@ def _draws(posterior: Posterior, along: Ridge) -> np.ndarray:
 def _verdict(fit: Fit, profile: Profile, contraction: float, prior: float) -> Verdict:
     k = int(fit.free[profile.place])
     entry = next(e for e in fit.entries if e.place.start <= k < e.place.stop)
-    log, span = entry.param.scale == "log", entry.param.upper - entry.param.lower
+    log, span = entry.param.scale == "log", entry.param.period or entry.param.upper - entry.param.lower
     value = float(fit.values[k])
-    low, high = (float(np.exp(x)) if log else float(x) for x in profile.interval)
-    lost = entry.name in fit.undetermined or profile.sd > (
-        UNDETERMINED["log"] if log else UNDETERMINED["linear"] * span
-    )
-    lost = lost or min(contraction, 1.0 - (profile.sd / prior) ** 2) < CONTRACTED
+    elsewhere = fit.elsewhere.get(profile.name, ())
+    others = np.log(elsewhere) if log else np.array(elsewhere)
+    low, high = min([profile.interval[0], *others]), max([profile.interval[1], *others])
+    sd = (high - low) / (2.0 * LEVEL)
+    lost = entry.name in fit.undetermined or sd > (UNDETERMINED["log"] if log else UNDETERMINED["linear"] * span)
+    lost = lost or min(contraction, 1.0 - (sd / prior) ** 2) < CONTRACTED
     if log or entry.param.weight:
-        weak = profile.sd / (1.0 if log else max(abs(value), SMALL_WEIGHT * span)) > WEAK
+        weak = sd / (1.0 if log else max(abs(value), SMALL_WEIGHT * span)) > WEAK
     else:
-        weak = profile.sd > WEAK_RANGE * span
-    state = STATES[2] if lost else STATES[1] if weak else STATES[0]
-    return Verdict(profile.name, entry.param.symbol, state, value, profile, (low, high), profile.open, contraction)
+        weak = sd > WEAK_RANGE * span
+    state = STATES[2] if lost else STATES[1] if weak or elsewhere or profile.missed > AGREE else STATES[0]
+    ends = (float(np.exp(low)), float(np.exp(high))) if log else (float(low), float(high))
+    return Verdict(profile.name, entry.param.symbol, state, value, profile, ends, profile.open, elsewhere, contraction)
 
 
 def _listed(names: list[str]) -> str:

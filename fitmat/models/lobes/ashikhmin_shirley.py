@@ -64,11 +64,12 @@ class TwoExponents(AbstractExponents):
 
     suffix: ClassVar[str] = "-aniso"
     isotropic: ClassVar[bool] = False
+    exchanged: ClassVar[tuple[str, ...]] = ("exponent_u", "exponent_v")
     exponent_u: Scalar = _exponent("n_u", "along", 200.0)
     exponent_v: Scalar = _exponent("n_v", "across", 20.0)
     rotation: Scalar = param(
-        -180.0, 180.0, symbol="φ_t", unit="°", default=0.0, starts=(0.0, 45.0),
-        doc="azimuth of the tangent in the frame of the measured azimuths",
+        -180.0, 180.0, symbol="φ_t", unit="°", default=0.0, starts=(0.0, 45.0), period=180.0,
+        doc="azimuth of the tangent in the frame of the measured azimuths; half a turn changes nothing",
     )  # fmt: skip
 
     @property

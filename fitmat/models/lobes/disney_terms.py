@@ -56,8 +56,8 @@ class Perceptual(AbstractRoughness):
         "a", 0.0, (0.2,), "0 is isotropic, 1 stretches the highlight ten to one along the tangent; 0.1 is hardly seen"
     )
     rotation: Scalar = param(
-        -180.0, 180.0, symbol="φ_t", unit="°", default=0.0, starts=(0.0,),
-        doc="azimuth of the tangent in the frame of the measured azimuths",
+        -180.0, 180.0, symbol="φ_t", unit="°", default=0.0, starts=(0.0,), period=180.0,
+        doc="azimuth of the tangent in the frame of the measured azimuths; half a turn changes nothing",
     )  # fmt: skip
 
     @property

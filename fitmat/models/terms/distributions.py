@@ -80,11 +80,12 @@ class Anisotropic(AbstractRoughness):
 
     suffix: ClassVar[str] = "-aniso"
     isotropic: ClassVar[bool] = False
+    exchanged: ClassVar[tuple[str, ...]] = ("alpha_x", "alpha_y")
     alpha_x: Scalar = _slope("α_x", "along", 0.1)
     alpha_y: Scalar = _slope("α_y", "across", 0.3)
     rotation: Scalar = param(
-        -180.0, 180.0, symbol="φ_t", unit="°", default=0.0, starts=(0.0, 45.0),
-        doc="azimuth of the tangent in the frame of the measured azimuths",
+        -180.0, 180.0, symbol="φ_t", unit="°", default=0.0, starts=(0.0, 45.0), period=180.0,
+        doc="azimuth of the tangent in the frame of the measured azimuths; half a turn changes nothing",
     )  # fmt: skip
 
     @property
