@@ -48,6 +48,9 @@ from .studies.study import study as study
 from .studies.study import Study as Study
 from .studies.result import load as load
 
+# Export
+from .exports.export import export as export
+
 # Report
 from .reports.page import report as report
 from .reports import plot as plot

@@ -25,13 +25,13 @@ _DEVICES = Path("/dev")
 _TRIES, _WAIT = 10, 0.02
 
 
-def default(source: Path) -> Path:
+def default(source: Path, what: str = "fitmat") -> Path:
     """`NAME-fitmat` beside the input, or the first `NAME-fitmat-2`, `-3`, … that neither exists nor is being made.
 
     Beside a device, as standard input is one, nothing is written, but in the working folder.
     """
     place = Path() if _DEVICES in source.parents else source.parent
-    return _free(place / f"{source.stem}-fitmat")
+    return _free(place / f"{source.name if source.is_dir() else source.stem}-{what}")
 
 
 def _free(first: Path) -> Path:

@@ -293,6 +293,16 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
         },
     ),
     "load": ({"folder": "/proc/x"}, {"folder": PATH}),
+    "export": (
+        {"material": LAMBERT},
+        {
+            "material": without(NOUN, AbstractBRDF, fm.Fit),
+            "target": (None, *TEXT, "hlsl"),
+            "folder": without(PATH, NOTHING),
+            **dict.fromkeys(("model", "name"), TEXT),
+            **dict.fromkeys(("verify", "force"), FLAG),
+        },
+    ),
     "report": ({"study": STUDY, "folder": "/proc/x"}, {"study": NOUN, "folder": PATH, "force": FLAG}),
 }
 """Public name → arguments that are right, and for each argument what is not."""

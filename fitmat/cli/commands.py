@@ -5,9 +5,18 @@ from typing import Any
 
 import typer
 
-from fitmat.cli import process
+from fitmat.cli import examples, process
 from fitmat.cli.flags.cache import ClearFlag
 from fitmat.cli.flags.design import CountFlag, ForFlag, KindFlag
+from fitmat.cli.flags.export import (
+    ExportOutFlag,
+    MaterialNameFlag,
+    NoVerifyFlag,
+    OneModelFlag,
+    ReplaceExportFlag,
+    ResultFlag,
+    TargetFlag,
+)
 from fitmat.cli.flags.files import (
     ConvertedFlag,
     DesignPlotFlag,
@@ -80,19 +89,7 @@ def about(version: VersionFlag = False) -> None:
 
 @app.command(
     cls=Command,
-    epilog="Columns of a table, by name: theta_i, theta_o and phi (or phi_i and phi_o, or a signed theta_o alone) in "
-    "degrees; brdf, brdf_cos, reflectance_factor, radiance, or signal and reference; brdf_r, brdf_g, brdf_b or "
-    "brdf_550 for channels; sigma where the noise is known.\n\n"
-    "Written to --out: report.html (tables and pictures), fit.json (the same numbers), posterior-MODEL.parquet (draws "
-    "of the parameters). Ctrl-C during sampling keeps what is done and still writes them; a killed run goes on "
-    "when it is given again.\n\n"
-    "Examples:\n\n"
-    "  fitmat fit measurements.csv\n\n"
-    "  fitmat fit measurements.csv --models lambert+ggx --fix ks=1 --out run1\n\n"
-    "  fitmat fit gold.csv --models ggx --ior Au --fix ks=1\n\n"
-    "  fitmat fit scan.txt --columns theta_i=AOI,brdf=4 --no-mcmc\n\n"
-    "  fitmat fit plate_10deg.txt plate_40deg.txt plate_70deg.txt --join\n\n"
-    "  fitmat fit mirror.csv --receiver-angle 0.5 --calibration 0.03",
+    epilog=examples.FIT,
 )
 @takes(files, reading, instrument)
 def fit(
@@ -135,10 +132,7 @@ def fit(
 
 @app.command(
     cls=Command,
-    epilog="Parameters that are not set keep the model's defaults, see fitmat models.\n\n"
-    "Example:\n\n"
-    "  fitmat simulate lambert+ggx --set kd=0.3 --set alpha=0.2 --out plastic.csv\n\n"
-    "  fitmat simulate ggx-slab-schlick --set alpha=0.6 --set f0=0.9 --samples 4096 --out rough.csv",
+    epilog=examples.SIMULATE,
 )
 @takes(instrument)
 def simulate(
@@ -174,7 +168,7 @@ def simulate(
 
 @app.command(
     cls=Command,
-    epilog="Examples:\n\n  fitmat check measurements.csv --plot coverage.png\n\n  fitmat check gold.binary --json",
+    epilog=examples.CHECK,
 )
 @takes(files, reading, instrument)
 def check(
@@ -202,9 +196,7 @@ def check(
 
 @app.command(
     cls=Command,
-    epilog="Examples:\n\n"
-    "  fitmat convert gold.binary gold.parquet\n\n"
-    "  fitmat convert scan.txt scan.bsdf --columns theta_i=AOI,brdf=4",
+    epilog=examples.CONVERT,
 )
 @takes(files, reading)
 def convert(
@@ -218,6 +210,23 @@ def convert(
     from fitmat.cli import convert
 
     process.say("\n".join([*convert.written(files, reading, out, force=force), visible(str(out))]))
+
+
+@app.command(cls=Command, epilog=examples.EXPORT)
+def export(
+    result: ResultFlag,
+    to: TargetFlag = "glsl",
+    out: ExportOutFlag = None,
+    model: OneModelFlag = None,
+    name: MaterialNameFlag = None,
+    no_verify: NoVerifyFlag = False,
+    force: ReplaceExportFlag = False,
+) -> None:
+    """Write the fitted material for a renderer, run it there, and say how far it is from the fit."""
+    process.set_up()
+    from fitmat.cli import export
+
+    process.say(str(export.written(result, to, out, model, name, verify=not no_verify, force=force)))
 
 
 @app.command(cls=Command)
@@ -240,8 +249,7 @@ def models(
 
 @app.command(
     cls=Command,
-    epilog="Examples:\n\n  fitmat design measurements.csv --for eta\n\n"
-    "  fitmat design measurements.csv --for match --kind curve --plot next.png",
+    epilog=examples.DESIGN,
 )
 @takes(files, reading, instrument)
 def design(

@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar, overload
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -19,11 +18,12 @@ from fitmat import arguments
 from fitmat._types import Directions, Samples, Scalar, Spectrum, Vec3
 from fitmat.errors import ModelError
 from fitmat.maths.programs import program
+from fitmat.models.glsl import AbstractShaded
 from fitmat.models.parameters import param
 from fitmat.text import brief
 
 
-class AbstractBRDF(eqx.Module):
+class AbstractBRDF(AbstractShaded):
     """A reflectance model; its `param` fields are what can be fitted.
 
     Attributes:
@@ -64,7 +64,7 @@ class AbstractBRDF(eqx.Module):
         return jnp.zeros(())
 
 
-class AbstractShape(eqx.Module):
+class AbstractShape(AbstractShaded):
     """How wide a lobe is, and along which axes.
 
     Attributes:
@@ -80,6 +80,19 @@ class AbstractShape(eqx.Module):
     @abstractmethod
     def local(self, w: Vec3) -> Vec3:
         """A direction in the frame whose x axis is the tangent."""
+
+
+LEVEL = """
+Pair facets(vec3 wi, vec3 wo) {
+    return pair(wi, wo);
+}
+"""
+TURNED = """
+Pair facets(vec3 wi, vec3 wo) {
+    return turned(pair(wi, wo), radians(-rotation));
+}
+"""
+# Two directions in the frame of a shape, in GLSL: the surface's own, or that of a tangent.
 
 
 class AbstractLobe(AbstractBRDF):

@@ -8,7 +8,7 @@ from typing import Any
 
 from typer.core import TyperCommand
 
-NEEDS = {"fit": {"force": "out"}, "check": {"force": "plot"}, "design": {"force": "plot"}}
+NEEDS = {"fit": {"force": "out"}, "check": {"force": "plot"}, "design": {"force": "plot"}, "export": {"force": "out"}}
 """Command → parameter → the one without which it would do nothing."""
 
 MOST = 4

@@ -5,14 +5,16 @@ from collections.abc import Callable
 from typing import Any, ClassVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 
 from fitmat._types import Array, Scalar, Spectrum, Vec3
 from fitmat.maths.directions import above
-from fitmat.models.around.exchange import exchange, mirrored
-from fitmat.models.around.face import face_albedo
+from fitmat.models.around.exchange import exchange, light_glsl, mirrored
+from fitmat.models.around.face import face_albedo, face_curve
 from fitmat.models.around.layer import Layer
 from fitmat.models.base import AbstractBRDF
+from fitmat.models.glsl import AbstractShaded, table
 from fitmat.models.lobes.microfacet import Microfacet
 from fitmat.models.parameters import param
 from fitmat.models.terms.distributions import GGX, Isotropic, Masking
@@ -33,7 +35,7 @@ def _depth() -> Any:
     )  # fmt: skip
 
 
-class AbstractCoat(eqx.Module):
+class AbstractCoat(AbstractShaded):
     """A dielectric layer: what its upper face mirrors, and how much."""
 
     name: ClassVar[str]
@@ -80,6 +82,18 @@ class SmoothCoat(AbstractCoat):
         """F(c)."""
         return lambda cos: dielectric(cos, self.eta)
 
+    def glsl(self) -> str:
+        """What it reflects; its image no value holds."""
+        return """
+float reflected(float c) {
+    return dielectric(c, vec3(eta)).x;
+}
+
+vec3 mirrored(vec3 wi, vec3 wo) {
+    return vec3(0.0);
+}
+"""
+
     def width(self) -> Scalar:
         """None."""
         return jnp.array(1.0)
@@ -99,8 +113,10 @@ class RoughCoat(AbstractCoat):
 
     def mirrored(self, wi: Vec3, wo: Vec3) -> Scalar:
         """The GGX lobe with the exact dielectric."""
-        face = Microfacet(jnp.ones(()), Isotropic(self.alpha), Dielectric(self.eta), GGX(), self.masking)
-        return face(wi, wo)
+        return self._face()(wi, wo)
+
+    def _face(self) -> Microfacet:
+        return Microfacet(jnp.ones(()), Isotropic(self.alpha), Dielectric(self.eta), GGX(), self.masking)
 
     def mirror(self, cos: Scalar) -> Scalar:
         """0: its image is a lobe."""
@@ -109,6 +125,23 @@ class RoughCoat(AbstractCoat):
     def reflectance(self) -> Callable[[Array], Array]:
         """The albedo of its lobe."""
         return face_albedo(self.alpha, Dielectric(self.eta), self.masking)
+
+    def glsl(self) -> str:
+        """Its lobe, and the albedo of that as the polynomial in √c that the model has."""
+        face = self._face()
+        known = jax.jit(lambda: face_curve(self.alpha, Dielectric(self.eta), self.masking).coefficients)()
+        lobe = face.glsl().replace("vec3 lobe(", "vec3 mirrored(").replace("return ks * ", "return ")
+        parts = face.roughness.glsl(), face.fresnel.glsl(), face.distribution.glsl(), lobe
+        return (
+            table("albedo", known)
+            + "".join(parts)
+            + """
+// Share of the light from a cosine that the face reflects.
+float reflected(float c) {
+    return clamp(chebyshev(albedo, 2.0 * sqrt(max(c, 1e-8)) - 1.0), 0.0, 1.0);
+}
+"""
+        )
 
     def width(self) -> Scalar:
         """Alpha itself."""
@@ -164,6 +197,32 @@ class Varnish(AbstractBRDF):
         body = self.base(down, up) * light.raised(wi[2]) * light.raised(wo[2]) + light.spread(wi[2], wo[2])
         return jnp.where(above(wi, wo), self.coat.mirrored(wi, wo) + enter * leave / layer.eta**2 * body, 0.0)
 
+    def glsl(self) -> str:
+        """The same; what goes back and forth between coat and base is numbers, unless the base has a polished coat."""
+        if any(isinstance(part, SmoothCoat) for part in jax.tree.leaves(self.base, is_leaf=_is_smooth)):
+            return ""
+        light = jax.jit(lambda: exchange(self.base, self.coat.layer()).numbers())()
+        return (
+            light_glsl(*light)
+            + """
+vec3 refracted(vec3 w) {
+    return vec3(w.xy / eta, sqrt(max((eta - 1.0) * (eta + 1.0) + w.z * w.z, 1e-14)) / eta);
+}
+
+// What enters, or leaves, and is left of it after the way through the coat.
+vec3 passed(float outer, float inner) {
+    return (1.0 - reflected(outer)) * exp(-depth / max(inner, 1e-7));
+}
+
+vec3 lobe(vec3 wi, vec3 wo) {
+    vec3 down = refracted(wi), up = refracted(wo);
+    vec3 body = base(down, up) * raised(wi.z) * raised(wo.z);
+    vec3 spread = eta * eta * later(wi.z) * later(wo.z) / (PI * whole);
+    return mirrored(wi, wo) + passed(wi.z, down.z) * passed(wo.z, up.z) / (eta * eta) * (body + spread);
+}
+"""
+        )
+
     def mirror(self, wi: Vec3) -> Spectrum:
         """That of the polished face, and of a polished coat below it through this one."""
         return self.coat.mirror(wi[2]) + mirrored(self.base, self.coat.layer(), wi)
@@ -176,3 +235,7 @@ class Varnish(AbstractBRDF):
     def isotropic(self) -> bool:
         """Where the base is."""
         return self.base.isotropic
+
+
+def _is_smooth(part: object) -> bool:
+    return isinstance(part, SmoothCoat)

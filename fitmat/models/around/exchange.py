@@ -17,6 +17,7 @@ from fitmat.maths.directions import COS_MIN, mirror, rotated
 from fitmat.maths.quadrature import cosine_mean, gauss
 from fitmat.models.around.layer import Energy, Layer
 from fitmat.models.base import AbstractBRDF
+from fitmat.models.glsl import spectrum, table
 from fitmat.models.lobes.lambert import Lambert
 
 LEAVING, KEPT = 10, 5
@@ -60,8 +61,15 @@ class Exchange(eqx.Module):
 
         Kulla & Conty's form (2017): reciprocal, and its energy is e.
         """
-        whole = jnp.maximum(cosine_mean(lambda c: self._later(c) * self._leaves(c)), _TINY)
-        return self.layer.eta**2 * self._later(ci) * self._later(co) / (jnp.pi * whole)
+        return self.layer.eta**2 * self._later(ci) * self._later(co) / (jnp.pi * self._whole())
+
+    def numbers(self) -> tuple[Array, Array, Spectrum]:
+        """`peak` and `rest` as coefficients of Chebyshev polynomials in 2√c − 1, and what `spread` divides by."""
+        turned = jnp.asarray(_TO_CHEBYSHEV)
+        return turned @ self.peak, turned @ self.rest, self._whole()
+
+    def _whole(self) -> Spectrum:
+        return jnp.maximum(cosine_mean(lambda c: self._later(c) * self._leaves(c)), _TINY)
 
     def _later(self, outer: Array) -> Energy:
         return jnp.maximum(_powers(_root(outer), LEAVING) @ self.rest, 0.0)
@@ -217,3 +225,33 @@ def _points(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 _ROOTS, _TO_LEAVING = _points(LEAVING)
 _BELOW, _TO_KEPT = _points(KEPT)
+
+_TO_CHEBYSHEV = np.stack(
+    [
+        np.polynomial.chebyshev.poly2cheb(np.polynomial.polynomial.polypow([0.5, 0.5], k)).tolist()
+        + [0.0] * (LEAVING - 1 - k)
+        for k in range(LEAVING)
+    ],
+    axis=1,
+)
+# From coefficients of powers of √c to those of Chebyshev polynomials in 2√c − 1.
+
+
+def light_glsl(peak: Array, rest: Array, whole: Spectrum) -> str:
+    """`raised` and `later` of an `Exchange` in GLSL, from its `numbers`."""
+    return (
+        table("peak", peak)
+        + table("rest", rest)
+        + spectrum("whole", whole)
+        + """
+// h(c): by how much the base's lobe is raised.
+vec3 raised(float c) {
+    return inversesqrt(1.0 - clamp(coat_series(peak, c), 0.0, 0.999));
+}
+
+// e(c): what leaves later, spread over all directions.
+vec3 later(float c) {
+    return max(coat_series(rest, c), 0.0);
+}
+"""
+    )

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 
 from fitmat._types import Scalar, Vec3
 from fitmat.maths.directions import COS_MIN, Pair, cos_difference
-from fitmat.maths.quadrature import curve, gauss, incidence
+from fitmat.maths.quadrature import Curve, curve, gauss, incidence
 from fitmat.models.terms.distributions import GGX, Masking, visibility
 from fitmat.models.terms.fresnel import AbstractFresnel
 
@@ -24,13 +24,18 @@ def face_albedo(alpha: Scalar, fresnel: AbstractFresnel, masking: Masking) -> Ca
     The normals move with alpha as they are seen, so that a mirror's rule is one direction; value and slope belong
     together.
     """
+    known = face_curve(alpha, fresnel, masking)
+    return lambda cos: jnp.clip(known(cos), 0.0, 1.0)
+
+
+def face_curve(alpha: Scalar, fresnel: AbstractFresnel, masking: Masking) -> Curve:
+    """The same as a polynomial, which may leave [0, 1] by its error."""
 
     def at(cos: Scalar) -> Scalar:
         w = incidence(jnp.arccos(cos))
         return jnp.asarray(_SHARES) @ jax.vmap(lambda p: _reflected(w, p, alpha, fresnel, masking))(jnp.asarray(_DISC))
 
-    known = curve(at)
-    return lambda cos: jnp.clip(known(cos), 0.0, 1.0)
+    return curve(at)
 
 
 def _reflected(w: Vec3, point: Float[Any, "2"], alpha: Scalar, fresnel: AbstractFresnel, masking: Masking) -> Scalar:

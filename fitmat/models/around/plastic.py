@@ -3,12 +3,14 @@
 from typing import ClassVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import above
 from fitmat.models.around.coat import RoughCoat, Varnish
 from fitmat.models.base import AbstractLobe
+from fitmat.models.glsl import spectrum
 from fitmat.models.lobes.lambert import Lambert
 from fitmat.models.parameters import param
 from fitmat.models.terms.distributions import Masking
@@ -65,6 +67,20 @@ class Plastic(AbstractLobe):
         mirrored = face.mirrored(wi, wo)
         both = Varnish(face, Lambert(self.kd))(wi, wo)
         return jnp.where(above(wi, wo), both + (self.ks - 1.0) * mirrored, 0.0)
+
+    def glsl(self) -> str:
+        """The same."""
+        face = RoughCoat(self.eta, self.alpha, jnp.zeros(()), self.masking)
+        return (
+            face.glsl()
+            + spectrum("returned", jax.jit(lambda: face.layer().returned())())
+            + """
+vec3 lobe(vec3 wi, vec3 wo) {
+    float through = (1.0 - reflected(wi.z)) * (1.0 - reflected(wo.z));
+    return ks * mirrored(wi, wo) + through * kd / (PI * eta * eta * (1.0 - kd * returned));
+}
+"""
+        )
 
     def width(self) -> Scalar:
         """Alpha itself."""

@@ -69,6 +69,15 @@ class ABg(AbstractSpecular):
         power = jnp.where(apart, jnp.exp(0.5 * self.g * jnp.log(jnp.where(apart, square, 1.0))), 0.0)
         return jnp.where(above(wi, wo), self.a / (self.b + power), 0.0)
 
+    def glsl(self) -> str:
+        """The same."""
+        return """
+vec3 lobe(vec3 wi, vec3 wo) {
+    float apart = length((wi + wo).xy);  // |beta - beta_0|
+    return a / (b + pow(apart, g));
+}
+"""
+
     def width(self) -> Scalar:
         """Half of B^(1/g), because |β − β₀| is about twice the slope of h; at least 10⁻⁴."""
         return jnp.clip(0.5 * self.b ** (1.0 / self.g), NARROWEST, 1.0)

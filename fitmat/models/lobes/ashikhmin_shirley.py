@@ -11,7 +11,7 @@ import jax.numpy as jnp
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import COS_MIN, above, pair, rotated
-from fitmat.models.base import AbstractLobe, AbstractShape
+from fitmat.models.base import LEVEL, TURNED, AbstractLobe, AbstractShape
 from fitmat.models.parameters import param
 from fitmat.models.terms.fresnel import Schlick
 
@@ -48,6 +48,10 @@ class OneExponent(AbstractExponents):
         """The direction itself."""
         return w
 
+    def glsl(self) -> str:
+        """The exponents and the level frame."""
+        return "const vec2 exponents = vec2(exponent);\n" + LEVEL
+
 
 def _exponent(symbol: str, along: str, default: float) -> Any:
     return param(
@@ -80,6 +84,10 @@ class TwoExponents(AbstractExponents):
     def local(self, w: Vec3) -> Vec3:
         """The direction turned by −rotation about the normal."""
         return rotated(w, -jnp.deg2rad(self.rotation))
+
+    def glsl(self) -> str:
+        """The exponents and the turned frame."""
+        return "const vec2 exponents = vec2(exponent_u, exponent_v);\n" + TURNED
 
 
 class AshikhminShirley(AbstractLobe):
@@ -119,6 +127,23 @@ class AshikhminShirley(AbstractLobe):
         lobe = jnp.sqrt((nu + 1.0) * (nv + 1.0)) / (8.0 * jnp.pi) * power / (cd * jnp.maximum(ci, co))
         diffuse = 28.0 / (23.0 * jnp.pi) * (1.0 - self.fresnel.normal_reflectance()) * _entering(ci) * _entering(co)
         return jnp.where(above(wi, wo), lobe * self.fresnel(p.cos_d) + self.kd * diffuse, 0.0)
+
+    def glsl(self) -> str:
+        """The same."""
+        return """
+float entering(float c) {
+    return 1.0 - pow5(1.0 - c / 2.0);
+}
+
+vec3 lobe(vec3 wi, vec3 wo) {
+    Pair p = facets(wi, wo);
+    float sin2 = dot(p.h.xy, p.h.xy), steep = dot(exponents, p.h.xy * p.h.xy);
+    float peak = exp(steep * (sin2 > 0.0 ? 0.5 * log_one_minus(min(sin2, 0.9999999)) / sin2 : -0.5));
+    float top = sqrt((exponents.x + 1.0) * (exponents.y + 1.0)) / (8.0 * PI);
+    vec3 gloss = top * peak * fresnel(p.cos_d) / (max(p.cos_d, 1e-7) * larger_cosine(wi, wo));
+    return gloss + 28.0 * kd / (23.0 * PI) * (1.0 - f0) * entering(wi.z) * entering(wo.z);
+}
+"""
 
     def width(self) -> Scalar:
         """√(2/(n+2)) of the larger exponent n: the α of the microfacet lobe with the same curvature at its peak."""

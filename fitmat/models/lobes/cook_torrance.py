@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import above, pair
 from fitmat.models.base import AbstractSpecular, specular_weight
-from fitmat.models.terms.distributions import Beckmann, Isotropic, Masking, visibility
+from fitmat.models.terms.distributions import VISIBILITY, Beckmann, Isotropic, Masking, visibility
 from fitmat.models.terms.fresnel import AbstractFresnel, Dielectric
 
 
@@ -51,6 +51,20 @@ class CookTorrance(AbstractSpecular):
         density = jnp.pi * Beckmann().density(p.h, slopes)
         g_cc = visibility(Beckmann(), self.masking, slopes, p)
         return jnp.where(above(wi, wo), self.ks * self.fresnel(p.cos_d) * density * g_cc / jnp.pi, 0.0)
+
+    def glsl(self) -> str:
+        """The same."""
+        return (
+            Beckmann().glsl()
+            + VISIBILITY[self.masking]
+            + """
+vec3 lobe(vec3 wi, vec3 wo) {
+    Pair p = facets(wi, wo);
+    float D = PI * density(p.h);  // exp(-tan^2(theta_h)/m^2)/(m^2 c_h^4): no 1/pi, as printed
+    return ks * fresnel(p.cos_d) * D * visibility(p) / PI;  // visibility is G/(c_i c_o)
+}
+"""
+        )
 
     def width(self) -> Scalar:
         """Alpha itself."""

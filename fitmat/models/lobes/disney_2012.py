@@ -92,6 +92,27 @@ class Disney2012(AbstractLobe):
         gloss = schlick(p.cos_d, f0) * specular(p, self.shape.slopes, self._masking())
         return jnp.where(above(wi, wo), (1.0 - self.metallic) * body + gloss + self.coat(p), 0.0)
 
+    def glsl(self) -> str:
+        """The same."""
+        alpha = "vec2((0.5 + roughness / 2.0) * (0.5 + roughness / 2.0))"
+        return f"""
+const vec2 masking = {alpha if self.remap else "slopes"};
+
+float rise(Pair p, float f90) {{
+    return (1.0 + (f90 - 1.0) * pow5(1.0 - p.wi.z)) * (1.0 + (f90 - 1.0) * pow5(1.0 - p.wo.z));
+}}
+
+vec3 lobe(vec3 wi, vec3 wo) {{
+    Pair p = facets(wi, wo);
+    float f90 = roughness * p.cos_d * p.cos_d;
+    float f_d = rise(p, 0.5 + 2.0 * f90), f_ss = 1.25 * (rise(p, f90) * (1.0 / max(wi.z + wo.z, 1e-7) - 0.5) + 0.5);
+    vec3 body = base_color / PI * mix(f_d, f_ss, subsurface) + cloth(p);
+    vec3 f0 = mix(0.08 * specular * mix(vec3(1.0), hue(base_color), specular_tint), base_color, metallic);
+    float D_G = D_ggx(p.h, slopes) / (masked_ggx(p.wi, masking) * masked_ggx(p.wo, masking));
+    return (1.0 - metallic) * body + schlick(p.cos_d, f0) * D_G / 4.0 + coat(p);
+}}
+"""
+
     @property
     def _roughness(self) -> Scalar:
         return self.shape.roughness

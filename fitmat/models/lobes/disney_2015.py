@@ -90,6 +90,26 @@ class Disney2015(AbstractLobe):
         gloss = self._fresnel(p.cos_d) * specular(p, slopes, slopes)
         return jnp.where(above(wi, wo), (1.0 - self.metallic) * body + gloss + self.coat(p), 0.0)
 
+    def glsl(self) -> str:
+        """The same."""
+        return """
+const float f0 = (eta - 1.0) * (eta - 1.0) / ((eta + 1.0) * (eta + 1.0));
+
+vec3 fresnel(float c) {
+    vec3 plain = mix(dielectric(c, vec3(eta)), schlick(c, f0 * hue(base_color)), specular_tint);
+    return mix(plain, schlick(c, base_color), metallic);
+}
+
+vec3 lobe(vec3 wi, vec3 wo) {
+    Pair p = facets(wi, wo);
+    float F_i = pow5(1.0 - wi.z), F_o = pow5(1.0 - wo.z), R = 2.0 * roughness * p.cos_d * p.cos_d;
+    float f_d = (1.0 - 0.5 * F_i) * (1.0 - 0.5 * F_o), f_retro = R * (F_i + F_o + F_i * F_o * (R - 1.0));
+    vec3 body = base_color / PI * (f_d + f_retro) + cloth(p);
+    float D_G = D_ggx(p.h, slopes) / (masked_ggx(p.wi, slopes) * masked_ggx(p.wo, slopes));
+    return (1.0 - metallic) * body + fresnel(p.cos_d) * D_G / 4.0 + coat(p);
+}
+"""
+
     def _fresnel(self, cos_d: Scalar) -> Spectrum:
         """Exact for the dielectric, Schlick where tinted and for the metal."""
         t, hue = self.specular_tint, tint(self.base_color)

@@ -5,12 +5,13 @@ Diffuse terms and Fresnel blends, in which the two differ, stand with each model
 
 from typing import Any, ClassVar
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import Pair, rotated
+from fitmat.models.base import TURNED
+from fitmat.models.glsl import AbstractShaded
 from fitmat.models.parameters import param
 from fitmat.models.terms.distributions import GGX, AbstractRoughness, Slopes, visibility
 from fitmat.models.terms.fresnel import schlick
@@ -70,6 +71,16 @@ class Perceptual(AbstractRoughness):
         """The direction turned by −rotation about the normal."""
         return rotated(w, -jnp.deg2rad(self.rotation))
 
+    def glsl(self) -> str:
+        """The slopes and the turned frame."""
+        return (
+            """
+const float aspect = sqrt(1.0 - 0.9 * anisotropic);
+const vec2 slopes = max(vec2(roughness * roughness / aspect, roughness * roughness * aspect), 0.001);
+"""
+            + TURNED
+        )
+
 
 def tint(base: Spectrum) -> Spectrum:
     """The base colour over its luminance, 1 where it is black (disney.brdf, `Ctint`).
@@ -94,7 +105,7 @@ def specular(p: Pair, slopes: Slopes, masking: Slopes) -> Scalar:
     return GGX().density(p.h, slopes) * visibility(GGX(), "separable", masking, p) / 4.0
 
 
-class Sheen(eqx.Module):
+class Sheen(AbstractShaded):
     """Light at grazing angles to h, as cloth shows it: sheen · (1 − c_d)⁵, tinted (disney.brdf, `Fsheen`)."""
 
     sheen: Scalar = param(
@@ -107,8 +118,16 @@ class Sheen(eqx.Module):
         """Sheen in sr⁻¹ for the base colour."""
         return self.sheen * schlick(p.cos_d, 0.0) * tinted(base, self.sheen_tint)
 
+    def glsl(self) -> str:
+        """The same."""
+        return """
+vec3 cloth(Pair p) {
+    return sheen * pow5(1.0 - p.cos_d) * mix(vec3(1.0), hue(base_color), sheen_tint);
+}
+"""
 
-class Clearcoat(eqx.Module):
+
+class Clearcoat(AbstractShaded):
     """A thin coat with F0 = 0.04, GTR1 normals and a quarter of the weight (disney.brdf, `Dr`, `Fr`, `Gr`).
 
     ¼ clearcoat F D_GTR1 G/(4 c_i c_o); G is Smith's for GGX with α = 0.25, whatever the gloss.
@@ -132,6 +151,16 @@ class Clearcoat(eqx.Module):
         masking = jnp.asarray(_COAT_MASKING)
         g_cc = visibility(GGX(), "separable", (masking, masking), p)
         return 0.25 * self.clearcoat * schlick(p.cos_d, _COAT_F0) * gtr1(p.h, self.alpha) * g_cc / 4.0
+
+    def glsl(self) -> str:
+        """The same."""
+        return """
+float coat(Pair p) {
+    float D = D_gtr1(p.h, mix(0.1, 0.001, clearcoat_gloss));
+    float G_cc = 1.0 / (masked_ggx(p.wi, vec2(0.25)) * masked_ggx(p.wo, vec2(0.25)));
+    return 0.25 * clearcoat * schlick(p.cos_d, 0.04) * D * G_cc / 4.0;
+}
+"""
 
     def width(self) -> Scalar:
         """Alpha, or 1 where there is no coat."""

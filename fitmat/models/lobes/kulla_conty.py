@@ -11,6 +11,7 @@ import jax.numpy as jnp
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import above
 from fitmat.models.base import AbstractSpecular, specular_weight
+from fitmat.models.glsl import scalar, spectrum
 from fitmat.models.lobes.microfacet import Microfacet
 from fitmat.models.terms.distributions import GGX, AbstractDistribution, Isotropic, Masking
 from fitmat.models.terms.energy import missing
@@ -52,12 +53,33 @@ class KullaConty(AbstractSpecular):
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """Single scattering plus what the other facets return."""
-        single = Microfacet(self.ks, self.roughness, self.fresnel, self.distribution, self.masking)(wi, wo)
+        single = self._single()(wi, wo)
         lost, f_avg = missing(self.distribution, self.masking, self.roughness.alpha), average(self.fresnel)
         mean = lost.average()
         f_ms = f_avg**2 * (1.0 - mean) / (1.0 - f_avg * mean)
         multiple = f_ms * lost(wi[2]) * lost(wo[2]) / (jnp.pi * mean)
         return single + jnp.where(above(wi, wo), self.ks * multiple, 0.0)
+
+    def _single(self) -> Microfacet:
+        return Microfacet(self.ks, self.roughness, self.fresnel, self.distribution, self.masking)
+
+    def glsl(self) -> str:
+        """The same; what depends on no direction is a number."""
+        lost, f_avg = missing(self.distribution, self.masking, self.roughness.alpha), average(self.fresnel)
+        mean = lost.average()
+        f_ms = f_avg**2 * (1.0 - mean) / (1.0 - f_avg * mean)
+        single = self._single().glsl().replace("vec3 lobe(", "vec3 single(")
+        return (
+            scalar("mean", mean)
+            + spectrum("f_ms", f_ms)
+            + lost.glsl()
+            + single
+            + """
+vec3 lobe(vec3 wi, vec3 wo) {
+    return single(wi, wo) + ks * f_ms * lost(wi.z) * lost(wo.z) / (PI * mean);
+}
+"""
+        )
 
     def width(self) -> Scalar:
         """Alpha itself."""

@@ -33,3 +33,11 @@ class Lambert(AbstractDiffuse):
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """kd/π."""
         return jnp.where(above(wi, wo), self.kd / jnp.pi, 0.0)
+
+    def glsl(self) -> str:
+        """The same."""
+        return """
+vec3 lobe(vec3 wi, vec3 wo) {
+    return kd / PI;
+}
+"""

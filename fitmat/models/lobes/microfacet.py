@@ -10,6 +10,7 @@ from fitmat.maths.directions import above
 from fitmat.models.base import AbstractSpecular, specular_weight
 from fitmat.models.terms.distributions import (
     GGX,
+    VISIBILITY,
     AbstractDistribution,
     AbstractRoughness,
     Isotropic,
@@ -57,6 +58,18 @@ class Microfacet(AbstractSpecular):
         density = self.distribution.density(p.h, slopes)
         g_cc = visibility(self.distribution, self.masking, slopes, p)
         return jnp.where(above(wi, wo), self.ks * self.fresnel(p.cos_d) * density * g_cc / 4.0, 0.0)
+
+    def glsl(self) -> str:
+        """The same."""
+        return (
+            VISIBILITY[self.masking]
+            + """
+vec3 lobe(vec3 wi, vec3 wo) {
+    Pair p = facets(wi, wo);
+    return ks * fresnel(p.cos_d) * density(p.h) * visibility(p) / 4.0;  // visibility is G/(c_i c_o)
+}
+"""
+        )
 
     def width(self) -> Scalar:
         """The smaller slope."""

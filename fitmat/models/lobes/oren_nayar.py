@@ -19,6 +19,10 @@ C2_FON = 2.0 / 3.0 - 28.0 / (15.0 * jnp.pi)
 """Portsmouth, Kutz & Hill's constants: the albedo of Fujii's s/t at grazing incidence, and its average."""
 
 
+VARIANCE = "const float variance = radians(sigma_n) * radians(sigma_n);\n"
+"""σ² in GLSL."""
+
+
 def _kd() -> Any:
     return param(
         0.0, 1.0, symbol="k_d", per_channel=True, weight=True, default=0.5, doc="albedo of a facet"
@@ -66,6 +70,21 @@ class OrenNayar(AbstractDiffuse):
         lobe = a + b * jnp.maximum(_shadow(wi, wo), 0.0) / _larger_cos(wi, wo)
         return jnp.where(above(wi, wo), self.kd / jnp.pi * lobe, 0.0)
 
+    def glsl(self) -> str:
+        """The same."""
+        return (
+            VARIANCE
+            + """
+const float A = 1.0 - 0.5 * variance / (variance + 0.33);
+const float B = 0.45 * variance / (variance + 0.09);
+
+vec3 lobe(vec3 wi, vec3 wo) {
+    float s = dot(wi.xy, wo.xy);  // sin(theta_i) sin(theta_o) cos(phi_i - phi_o)
+    return kd / PI * (A + B * max(s, 0.0) / larger_cosine(wi, wo));
+}
+"""
+        )
+
     def _coefficients(self) -> tuple[Scalar, Scalar]:
         """A and B."""
         variance = jnp.deg2rad(self.sigma_n) ** 2
@@ -108,6 +127,26 @@ class OrenNayarFull(AbstractDiffuse):
         once, twice = _direct(wi, wo, self.sigma_n), _interreflected(wi, wo, self.sigma_n)
         return jnp.where(above(wi, wo), self.kd / jnp.pi * jnp.maximum(once + 0.17 * self.kd * twice, 0.0), 0.0)
 
+    def glsl(self) -> str:
+        """The same, with α and β by their halves of the tangent."""
+        return (
+            VARIANCE
+            + """
+vec3 lobe(vec3 wi, vec3 wo) {
+    float ti = zenith(wi), to = zenith(wo), s = dot(wi.xy, wo.xy), top = larger_cosine(wi, wo);
+    float product = sine(wi) * sine(wo), azimuth = product > 0.0 ? clamp(s / product, -1.0, 1.0) : 0.0;
+    float lean = 2.0 / PI * min(ti, to), tan_beta = min(sine(wi), sine(wo)) / top;
+    float tan_half = (sine(wi) + sine(wo)) / max(wi.z + wo.z, 1e-7);
+    float wide = 4.0 * ti * to / (PI * PI), rough = variance / (variance + 0.09);
+    float C1 = 1.0 - 0.5 * variance / (variance + 0.33), C3 = 0.125 * rough * wide * wide;
+    float shadowed = min(azimuth, 0.0) * tan_beta * lean * lean * lean;
+    float once = C1 + 0.45 * rough * (s / top - shadowed) + (1.0 - abs(azimuth)) * C3 * tan_half;
+    float twice = variance / (variance + 0.13) * (1.0 - azimuth * lean * lean);
+    return kd / PI * max(once + 0.17 * kd * twice, 0.0);
+}
+"""
+        )
+
 
 class EnergyPreservingOrenNayar(AbstractDiffuse):
     """EON, the energy-preserving Oren–Nayar of Portsmouth, Kutz & Hill 2025.
@@ -144,6 +183,29 @@ class EnergyPreservingOrenNayar(AbstractDiffuse):
         once = self.kd * a * (1.0 + self.r * jnp.where(s > 0.0, s / _larger_cos(wi, wo), s))
         lost = self.r * a * _missing(wi) * _missing(wo) / (C1_FON - C2_FON)
         return jnp.where(above(wi, wo), (once + self._multiple() * lost) / jnp.pi, 0.0)
+
+    def glsl(self) -> str:
+        """The same."""
+        return """
+const float C1 = 0.5 - 2.0 / (3.0 * PI);
+const float C2 = 2.0 / 3.0 - 28.0 / (15.0 * PI);
+const float A = 1.0 / (1.0 + C1 * r);
+const float mean = (1.0 + C2 * r) / (1.0 + C1 * r);
+const vec3 kd_ms = kd * kd * mean / (1.0 - kd * (1.0 - mean));
+
+// (1 - E(c))/(r A): what the first term loses
+float missing(vec3 w) {
+    float s = sine(w), c = w.z;
+    float G = s * (zenith(w) - s * c) + 2.0 / 3.0 * s * (c * (1.0 + s + s * s) / (1.0 + s) - 1.0);
+    return C1 - G / PI;
+}
+
+vec3 lobe(vec3 wi, vec3 wo) {
+    float s = dot(wi.xy, wo.xy);
+    vec3 once = kd * A * (1.0 + r * (s > 0.0 ? s / larger_cosine(wi, wo) : s));
+    return (once + kd_ms * r * A * missing(wi) * missing(wo) / (C1 - C2)) / PI;
+}
+"""
 
     def _average(self) -> Scalar:
         """Ē = A (1 + (2/3 − 28/(15π)) r)."""

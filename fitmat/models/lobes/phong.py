@@ -60,6 +60,15 @@ class Phong(AbstractSpecular):
         lobe = (n + 2.0) / (2.0 * jnp.pi) * _power(mirror(wi) @ wo, n)
         return jnp.where(above(wi, wo), self.ks * lobe, 0.0)
 
+    def glsl(self) -> str:
+        """The same."""
+        return """
+vec3 lobe(vec3 wi, vec3 wo) {
+    vec3 away = wo - vec3(-wi.xy, wi.z);  // from the mirror direction; its square is 2 (1 - r . wo)
+    return ks * (exponent + 2.0) / (2.0 * PI) * power(0.5 * dot(away, away), exponent);
+}
+"""
+
     def width(self) -> Scalar:
         """Half that of Blinn's lobe: the angle to the mirror direction is twice the angle to h."""
         return _blinn_width(self.exponent) / 2.0
@@ -96,6 +105,14 @@ class BlinnPhong(AbstractSpecular):
         lobe = (n + 8.0) / (8.0 * jnp.pi) * _power(half_vector(wi, wo)[2], n)
         return jnp.where(above(wi, wo), self.ks * lobe, 0.0)
 
+    def glsl(self) -> str:
+        """The same."""
+        return """
+vec3 lobe(vec3 wi, vec3 wo) {
+    return ks * (exponent + 8.0) / (8.0 * PI) * half_power(pair(wi, wo).h, exponent);
+}
+"""
+
     def width(self) -> Scalar:
         """√(2/(n+2))."""
         return _blinn_width(self.exponent)
@@ -127,6 +144,16 @@ class BlinnPhongExact(AbstractSpecular):
         n = self.exponent
         norm = (n + 2.0) * (n + 4.0) / (8.0 * jnp.pi * (2.0 ** (-n / 2.0) + n))
         return jnp.where(above(wi, wo), self.ks * norm * _power(half_vector(wi, wo)[2], n), 0.0)
+
+    def glsl(self) -> str:
+        """The same."""
+        return """
+const float norm = (exponent + 2.0) * (exponent + 4.0) / (8.0 * PI * (exp2(-exponent / 2.0) + exponent));
+
+vec3 lobe(vec3 wi, vec3 wo) {
+    return ks * norm * half_power(pair(wi, wo).h, exponent);
+}
+"""
 
     def width(self) -> Scalar:
         """√(2/(n+2))."""

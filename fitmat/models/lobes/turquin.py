@@ -11,9 +11,10 @@ import equinox as eqx
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.models.base import AbstractSpecular, specular_weight
+from fitmat.models.glsl import spectrum
 from fitmat.models.lobes.microfacet import Microfacet
 from fitmat.models.terms.distributions import GGX, AbstractDistribution, Isotropic, Masking
-from fitmat.models.terms.energy import missing
+from fitmat.models.terms.energy import Missing, missing
 from fitmat.models.terms.fresnel import AbstractFresnel, Dielectric
 
 
@@ -58,9 +59,28 @@ class Turquin(AbstractSpecular):
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """Single scattering times 1 + F0 (1 − E)/E."""
-        single = Microfacet(self.ks, self.roughness, self.fresnel, self.distribution, self.masking)(wi, wo)
-        lost = missing(self.distribution, self.masking, self.roughness.alpha)(wo[2])
+        single, lost = self._single()(wi, wo), self._missing()(wo[2])
         return single * (1.0 + self.fresnel.normal_reflectance() * lost / (1.0 - lost))
+
+    def _single(self) -> Microfacet:
+        return Microfacet(self.ks, self.roughness, self.fresnel, self.distribution, self.masking)
+
+    def _missing(self) -> Missing:
+        return missing(self.distribution, self.masking, self.roughness.alpha)
+
+    def glsl(self) -> str:
+        """The same."""
+        single = self._single().glsl().replace("vec3 lobe(", "vec3 single(")
+        return (
+            spectrum("normal", self.fresnel.normal_reflectance())
+            + self._missing().glsl()
+            + single
+            + """
+vec3 lobe(vec3 wi, vec3 wo) {
+    return single(wi, wo) * (1.0 + normal * lost(wo.z) / (1.0 - lost(wo.z)));
+}
+"""
+        )
 
     def width(self) -> Scalar:
         """Alpha itself."""

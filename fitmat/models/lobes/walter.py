@@ -38,7 +38,14 @@ class Walter(AbstractSpecular):
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """Eq. 20 with separable masking."""
-        return Microfacet(self.ks, self.roughness, self.fresnel, self.distribution, "separable")(wi, wo)
+        return self._single()(wi, wo)
+
+    def _single(self) -> Microfacet:
+        return Microfacet(self.ks, self.roughness, self.fresnel, self.distribution, "separable")
+
+    def glsl(self) -> str:
+        """The same."""
+        return self._single().glsl()
 
     def width(self) -> Scalar:
         """Alpha itself."""

@@ -53,6 +53,17 @@ class Ward(AbstractSpecular):
         root = jnp.sqrt(jnp.maximum(wi[2], COS_MIN) * jnp.maximum(wo[2], COS_MIN))
         return jnp.where(above(wi, wo), self.ks * gaussian / (4.0 * root), 0.0)
 
+    def glsl(self) -> str:
+        """The same."""
+        return """
+vec3 lobe(vec3 wi, vec3 wo) {
+    vec3 h = facets(wi, wo).h;
+    float cos2 = cosine(h) * cosine(h);
+    float gaussian = cos2 * cos2 * D_beckmann(h, slopes);  // exp(-tan^2(theta_h)/alpha^2)/(pi alpha^2)
+    return ks * gaussian / (4.0 * sqrt(cosine(wi) * cosine(wo)));
+}
+"""
+
     def width(self) -> Scalar:
         """The smaller slope."""
         return self.roughness.width()
@@ -87,6 +98,14 @@ class WardBounded(AbstractSpecular):
         square = jnp.maximum(jnp.sum((wi + wo) ** 2), COS_MIN**2)
         density = Beckmann().density(self.roughness.local(half_vector(wi, wo)), self.roughness.slopes)
         return jnp.where(above(wi, wo), self.ks * density / square, 0.0)
+
+    def glsl(self) -> str:
+        """The same."""
+        return """
+vec3 lobe(vec3 wi, vec3 wo) {
+    return ks * D_beckmann(facets(wi, wo).h, slopes) / max(dot(wi + wo, wi + wo), 1e-14);
+}
+"""
 
     def width(self) -> Scalar:
         """The smaller slope."""

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from fitmat._types import Scalar, Spectrum
+from fitmat.models.glsl import number, spectrum
 from fitmat.models.parameters import param
 from fitmat.models.refractive_index import index
 from fitmat.models.terms.fresnel import (
@@ -20,6 +21,7 @@ from fitmat.models.terms.fresnel import (
     conductor,
     f0_f82_from_ior,
     f0_from_ior,
+    fresnel_glsl,
     hoffman,
     library,
     schlick,
@@ -68,6 +70,21 @@ class Belcour(AbstractFresnel):
     def __call__(self, cos_d: Scalar) -> Spectrum:
         """See `belcour`."""
         return belcour(cos_d, self.eta, self.kappa)
+
+    def glsl(self) -> str:
+        """See `belcour`; its weights are numbers, as the indices are."""
+        w, eta, kappa = (
+            weights(*map(np.atleast_1d, (self.eta, self.kappa))),
+            np.asarray(self.eta),
+            np.asarray(self.kappa),
+        )
+        (first, second), powers = COEFFICIENTS.tolist(), POWERS.tolist()
+        sums = (
+            " + ".join(f"{number(k)} * pow(1.0 - c, {number(j)})" for k, j in zip(row, powers, strict=True))
+            for row in (first, second)
+        )
+        constants = spectrum("f0", f0_from_ior(eta, kappa)) + spectrum("w0", w[0]) + spectrum("w1", w[1])
+        return constants + fresnel_glsl("clamp(schlick(c, f0) + c * ({}) * w0 + c * ({}) * w1, 0.0, 1.0)".format(*sums))
 
     def normal_reflectance(self) -> Spectrum:
         """((η−1)² + κ²)/((η+1)² + κ²), exact."""

@@ -8,13 +8,13 @@ G/(c_i c_o). Fresnel and the assembly into a BRDF live elsewhere.
 from abc import abstractmethod
 from typing import Any, ClassVar, Literal, get_args
 
-import equinox as eqx
 import jax.numpy as jnp
 from jax.scipy.special import erf
 
 from fitmat._types import Scalar, Vec3
 from fitmat.maths.directions import COS_MIN, Pair, pair, rotated
-from fitmat.models.base import AbstractShape
+from fitmat.models.base import LEVEL, TURNED, AbstractShape
+from fitmat.models.glsl import AbstractShaded
 from fitmat.models.parameters import param
 
 Masking = Literal["correlated", "separable", "v-cavity"]
@@ -64,6 +64,10 @@ class Isotropic(AbstractRoughness):
         """The direction itself."""
         return w
 
+    def glsl(self) -> str:
+        """The slopes and the level frame."""
+        return "const vec2 slopes = vec2(alpha);\n" + LEVEL
+
 
 def _slope(symbol: str, along: str, default: float) -> Any:
     return param(
@@ -97,8 +101,12 @@ class Anisotropic(AbstractRoughness):
         """The direction turned by −rotation about the normal."""
         return rotated(w, -jnp.deg2rad(self.rotation))
 
+    def glsl(self) -> str:
+        """The slopes and the turned frame."""
+        return "const vec2 slopes = vec2(alpha_x, alpha_y);\n" + TURNED
 
-class AbstractDistribution(eqx.Module):
+
+class AbstractDistribution(AbstractShaded):
     """Statistics of micro-normals for given slopes; directions are in the frame of the tangent.
 
     Attributes:
@@ -131,6 +139,10 @@ class GGX(AbstractDistribution):
         """½(c + √(c² + α_x² ω_x² + α_y² ω_y²))."""
         return 0.5 * (_cos(w) + jnp.sqrt(_cos(w) ** 2 + _spread(w, slopes)))
 
+    def glsl(self) -> str:
+        """Both, for the lobe's slopes."""
+        return _functions("D_ggx", "masked_ggx")
+
 
 class Beckmann(AbstractDistribution):
     """Gaussian slopes (Beckmann & Spizzichino 1963; Walter et al. 2007, eqs. 25–26; Heitz 2014, eqs. 80–84)."""
@@ -150,6 +162,10 @@ class Beckmann(AbstractDistribution):
         a = cos / s
         return 0.5 * cos * (1.0 + erf(a)) + s * jnp.exp(-(a**2)) / (2.0 * jnp.sqrt(jnp.pi))
 
+    def glsl(self) -> str:
+        """Both, for the lobe's slopes."""
+        return _functions("D_beckmann", "masked_beckmann")
+
 
 class BeckmannRational(AbstractDistribution):
     """Beckmann's distribution with Walter's rational approximation of its masking, off by at most 0.35 %."""
@@ -167,6 +183,22 @@ class BeckmannRational(AbstractDistribution):
         near = a < 1.6
         small = jnp.where(near, a, 1.0)
         return jnp.where(near, s * (1.0 + small * (2.276 + 2.577 * small)) / (3.535 + 2.181 * small), cos)
+
+    def glsl(self) -> str:
+        """Both, for the lobe's slopes."""
+        return _functions("D_beckmann", "masked_beckmann_rational")
+
+
+def _functions(density: str, masked: str) -> str:
+    return f"""
+float density(vec3 h) {{
+    return {density}(h, slopes);
+}}
+
+float masked_cos(vec3 w) {{
+    return {masked}(w, slopes);
+}}
+"""
 
 
 def _cos(w: Vec3) -> Scalar:
@@ -197,3 +229,28 @@ def visibility(distribution: AbstractDistribution, masking: Masking, slopes: Slo
     if masking == "separable":
         return 1.0 / (ai * ao)
     return 1.0 / (ai * co + ao * ci - ci * co)
+
+
+VISIBILITY: dict[Masking, str] = {
+    "correlated": """
+// G/(c_i c_o) = 1/(c_i c_o (1 + Lambda_i + Lambda_o)), heights correlated (Heitz 2014).
+float visibility(Pair p) {
+    float ci = cosine(p.wi), co = cosine(p.wo);
+    return 1.0 / (masked_cos(p.wi) * co + masked_cos(p.wo) * ci - ci * co);
+}
+""",
+    "separable": """
+// G/(c_i c_o) = 1/(c_i (1 + Lambda_i) c_o (1 + Lambda_o)), Smith.
+float visibility(Pair p) {
+    return 1.0 / (masked_cos(p.wi) * masked_cos(p.wo));
+}
+""",
+    "v-cavity": """
+// G/(c_i c_o), G = min(1, 2 c_h c_i/c_d, 2 c_h c_o/c_d) (Cook & Torrance 1982).
+float visibility(Pair p) {
+    float ci = cosine(p.wi), co = cosine(p.wo);
+    return min(1.0 / (ci * co), 2.0 * cosine(p.h) / max(p.cos_d, 1e-7) / max(ci, co));
+}
+""",
+}
+"""`visibility` in GLSL."""

@@ -7,12 +7,12 @@ import functools
 from pathlib import Path
 from typing import Any
 
-import equinox as eqx
 import numpy as np
 from jaxtyping import Float
 
 from fitmat.maths.arrays import library
 from fitmat.maths.quadrature import chebyshev, gauss
+from fitmat.models.glsl import AbstractShaded, scalar, table
 from fitmat.models.terms.distributions import AbstractDistribution, Masking
 
 FILE = Path(__file__).with_name("energies.npz")
@@ -34,7 +34,7 @@ SMALLEST = 1e-6
 # What is missing is kept positive: m becomes (m + √(m² + SMALLEST²))/2.
 
 
-class Missing(eqx.Module):
+class Missing(AbstractShaded):
     """1 − E(c) for one alpha: what single scattering at white facets loses of the light from a cosine.
 
     Attributes:
@@ -52,6 +52,25 @@ class Missing(eqx.Module):
         u = c * (1.0 + SCALE * self.alpha) / (c + SCALE * self.alpha)
         found = chebyshev(self.coefficients, 2.0 * u - 1.0)
         return 0.5 * (found + xp.sqrt(found**2 + SMALLEST**2))
+
+    def glsl(self) -> str:
+        """`lost(c)` for a lobe with one `alpha`, about c = 1, where it is small: m = m₁ − t q(1 − t), t = 2(1 − u)."""
+        coefficients = np.asarray(self.coefficients)
+        first = coefficients.sum()  # every T_k(1) is 1
+        rest, _ = np.polynomial.chebyshev.chebdiv(coefficients - first * np.eye(1, len(coefficients))[0], [-1.0, 1.0])
+        at_normal, slope = scalar("at_normal", first), table("slope", np.pad(rest, (0, len(coefficients) - len(rest))))
+        return (
+            at_normal
+            + slope
+            + """
+// 1 - E(c): what single scattering at white facets loses of the light from a cosine, to 1.3e-4.
+float lost(float c) {
+    float t = 4.0 * alpha * (1.0 - c) / (c + 2.0 * alpha);
+    float m = at_normal - t * chebyshev(slope, 1.0 - t);
+    return 0.5 * (m + sqrt(m * m + 1e-12));
+}
+"""
+        )
 
     def average(self) -> Float[Any, ""]:
         """2∫ (1 − E(c)) c dc, of light that comes evenly from the hemisphere; Gauss in √c."""

@@ -7,7 +7,6 @@ materials and the fitted basis of Belcour live elsewhere; there are no thin film
 from abc import abstractmethod
 from typing import Any, ClassVar, TypeVar, overload
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -15,6 +14,7 @@ from jaxtyping import Array
 
 from fitmat._types import Scalar, Spectrum
 from fitmat.maths.arrays import library
+from fitmat.models.glsl import AbstractShaded
 from fitmat.models.parameters import param
 
 Numbers = TypeVar("Numbers", Array, np.ndarray)
@@ -28,7 +28,7 @@ _PEAK_82 = COS_82 * (1.0 - COS_82) ** 6
 _TINY = 1e-300
 
 
-class AbstractFresnel(eqx.Module):
+class AbstractFresnel(AbstractShaded):
     """Reflectance of an interface as a function of the angle to the micro-normal."""
 
     suffix: ClassVar[str]
@@ -55,6 +55,10 @@ class Dielectric(AbstractFresnel):
         """See `dielectric`."""
         return dielectric(cos_d, self.eta)
 
+    def glsl(self) -> str:
+        """See `dielectric`."""
+        return fresnel_glsl("dielectric(c, vec3(eta))")
+
     def normal_reflectance(self) -> Spectrum:
         """((η−1)/(η+1))²."""
         return f0_from_eta(self.eta)
@@ -76,6 +80,10 @@ class Conductor(AbstractFresnel):
     def __call__(self, cos_d: Scalar) -> Spectrum:
         """See `conductor`."""
         return conductor(cos_d, self.eta, self.kappa)
+
+    def glsl(self) -> str:
+        """See `conductor`."""
+        return fresnel_glsl("conductor(c, eta, kappa)")
 
     def normal_reflectance(self) -> Spectrum:
         """((η−1)² + κ²)/((η+1)² + κ²)."""
@@ -99,6 +107,10 @@ class Schlick(AbstractFresnel):
         """See `schlick`."""
         return schlick(cos_d, self.f0)
 
+    def glsl(self) -> str:
+        """See `schlick`."""
+        return fresnel_glsl("schlick(c, f0)")
+
     def normal_reflectance(self) -> Spectrum:
         """The parameter itself."""
         return self.f0
@@ -120,6 +132,10 @@ class F82(AbstractFresnel):
     def __call__(self, cos_d: Scalar) -> Spectrum:
         """See `hoffman`."""
         return hoffman(cos_d, self.f0, self.f82)
+
+    def glsl(self) -> str:
+        """See `hoffman`."""
+        return fresnel_glsl("hoffman(c, f0, f82)")
 
     def normal_reflectance(self) -> Spectrum:
         """The parameter f0 itself."""
@@ -171,6 +187,15 @@ def conductor(cos_d: Numbers | float, eta: Numbers, kappa: Numbers) -> Numbers:
     t4 = 2.0 * a * cos_d * sin2
     rp = rs * (t3 - t4) / (t3 + t4)
     return 0.5 * (rs + rp)
+
+
+def fresnel_glsl(call: str) -> str:
+    """The reflectance at a cosine, c, in GLSL."""
+    return f"""
+vec3 fresnel(float c) {{
+    return {call};
+}}
+"""
 
 
 @overload

@@ -1,0 +1,48 @@
+"""Examples: what `fitmat COMMAND --help` ends with.
+
+They hold no flag.
+"""
+
+FIT = (
+    "Columns of a table, by name: theta_i, theta_o and phi (or phi_i and phi_o, or a signed theta_o alone) in "
+    "degrees; brdf, brdf_cos, reflectance_factor, radiance, or signal and reference; brdf_r, brdf_g, brdf_b or "
+    "brdf_550 for channels; sigma where the noise is known.\n\n"
+    "Written to --out: report.html (tables and pictures), fit.json (the same numbers), posterior-MODEL.parquet (draws "
+    "of the parameters). Ctrl-C during sampling keeps what is done and still writes them; a killed run goes on "
+    "when it is given again.\n\n"
+    "Examples:\n\n"
+    "  fitmat fit measurements.csv\n\n"
+    "  fitmat fit measurements.csv --models lambert+ggx --fix ks=1 --out run1\n\n"
+    "  fitmat fit gold.csv --models ggx --ior Au --fix ks=1\n\n"
+    "  fitmat fit scan.txt --columns theta_i=AOI,brdf=4 --no-mcmc\n\n"
+    "  fitmat fit plate_10deg.txt plate_40deg.txt plate_70deg.txt --join\n\n"
+    "  fitmat fit mirror.csv --receiver-angle 0.5 --calibration 0.03"
+)
+
+SIMULATE = (
+    "Parameters that are not set keep the model's defaults, see fitmat models.\n\n"
+    "Example:\n\n"
+    "  fitmat simulate lambert+ggx --set kd=0.3 --set alpha=0.2 --out plastic.csv\n\n"
+    "  fitmat simulate ggx-slab-schlick --set alpha=0.6 --set f0=0.9 --samples 4096 --out rough.csv"
+)
+
+CHECK = "Examples:\n\n  fitmat check measurements.csv --plot coverage.png\n\n  fitmat check gold.binary --json"
+
+CONVERT = (
+    "Examples:\n\n"
+    "  fitmat convert gold.binary gold.parquet\n\n"
+    "  fitmat convert scan.txt scan.bsdf --columns theta_i=AOI,brdf=4"
+)
+
+DESIGN = (
+    "Examples:\n\n  fitmat design measurements.csv --for eta\n\n"
+    "  fitmat design measurements.csv --for match --kind curve --plot next.png"
+)
+
+EXPORT = (
+    "Written to --out for glsl: NAME.glsl, the function vec3 brdf(vec3 wi, vec3 wo) to paste; NAME.vert and NAME.frag, "
+    "which light with it; export.json, its values and how far it is from the model.\n\n"
+    "Examples:\n\n"
+    "  fitmat export run1 --to glsl\n\n"
+    "  fitmat export run1 --model lambert+ggx --name 'satin plastic' --out shaders"
+)

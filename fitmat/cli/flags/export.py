@@ -1,0 +1,39 @@
+"""Flags of an export: which run, for which renderer, under which name.
+
+They set no default and check nothing but their type.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+ResultFlag = Annotated[Path, typer.Argument(help="Folder of a run of fitmat fit, or the fit.json in it.")]
+
+TargetFlag = Annotated[str, typer.Option("--to", help="What it is written for: glsl.", metavar="TARGET")]
+
+ExportOutFlag = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        help="Folder for the files; default RESULT-TARGET (then -2, -3, …) beside the run.",
+        metavar="DIR",
+        show_default=False,
+    ),
+]
+
+OneModelFlag = Annotated[
+    str | None,
+    typer.Option(help="Which model of the run; default the one that the data prefer.", show_default=False),
+]
+
+MaterialNameFlag = Annotated[
+    str | None,
+    typer.Option(help="Name of the material, and of its files; default that of the measurements.", show_default=False),
+]
+
+NoVerifyFlag = Annotated[
+    bool, typer.Option("--no-verify", help="Do not run what was written; else Chromium runs it, where there is one.")
+]
+
+ReplaceExportFlag = Annotated[bool, typer.Option("--force", help="Replace the files of an earlier export in --out.")]
