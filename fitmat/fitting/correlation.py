@@ -73,7 +73,13 @@ class Correlation:
 
 
 def correlate(
-    best: AbstractBRDF, data: Data, s: float, moved: Coordinates, information: Float[np.ndarray, "p p"], count: int
+    best: AbstractBRDF,
+    data: Data,
+    s: float,
+    moved: Coordinates,
+    information: Float[np.ndarray, "p p"],
+    count: int,
+    rho: float = 0.0,
 ) -> Correlation:
     """The correlation of a fit's misfit, from its residuals.
 
@@ -84,6 +90,8 @@ def correlate(
         moved: The parameters that were fitted.
         information: Of the natural coordinates of all parameters, all values counted, (p, p).
         count: Values that were fitted, of which `data` may hold a part.
+        rho: Correlation of the errors of neighbouring readings, where the data show one: no variance is less than
+            (1 + ρ)/(1 − ρ) times H⁻¹, as for the mean of an AR(1), as far as the spread is noise and not misfit.
     """
     centre, none = np.asarray(vector(best)), _unchanged(data, moved.count, count)
     if not (data.loss.posterior and np.isfinite(information).all() and np.isfinite(centre).all()):
@@ -102,14 +110,15 @@ def correlate(
     found = find(r, slopes, used, root)
     asked, half = found.gain >= ASKED, np.linalg.solve(h, meat(found, slopes, (root, left), more))
     ratio, axes = np.linalg.eigh(np.linalg.solve(h, half.T))
-    if not asked.any() or ratio[-1] <= 1.0:
+    least = 1.0 + 2.0 * rho / (1.0 - rho) / (1.0 + s / float(data.typical)) ** 2
+    if least == 1.0 and (not asked.any() or ratio[-1] <= 1.0):
         judged = np.isfinite(found.gain).any()
         return dataclasses.replace(none, gain=found.gain, outcome="independent") if judged else none
     stretch, inflation = np.eye(moved.count), np.ones(moved.count)
-    wide = np.linalg.solve(h.T, axes * np.sqrt(np.maximum(ratio, 1.0)))
+    wide = np.linalg.solve(h.T, axes * np.sqrt(np.maximum(ratio, least)))
     stretch[np.ix_(inside, inside)] = wide @ axes.T @ h.T
     inflation[inside] = np.sum(wide**2, axis=1) / np.sum(np.linalg.inv(h) ** 2, axis=0)
-    alike = independent(found, used, root, more)
+    alike = min(independent(found, used, root, more), count / least)
     return Correlation(found.size, found.gain, stretch, inflation, alike, "correlated")
 
 

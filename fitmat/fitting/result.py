@@ -111,7 +111,8 @@ class Fit:
     @functools.cached_property
     def correlation(self) -> Correlation:
         """How alike the misfits of neighbouring geometries are, and what follows for everything that is quoted."""
-        return correlate(self.model, self.data, self.discrepancy, self.coordinates, self.information, self.n_values)
+        known = self.model, self.data, self.discrepancy, self.coordinates, self.information, self.n_values
+        return correlate(*known, self.noise.rho)
 
     @functools.cached_property
     def covariance(self) -> Float[np.ndarray, "p p"]:
@@ -273,10 +274,11 @@ def conclude(
 
 def _misfit(best: AbstractBRDF, data: Data) -> float:
     plain = data.under(DEFAULT)
-    return float(_discrepancy(at(best, data.wi, data.wo) * data.kappa, plain, first_discrepancy(plain)))
+    return float(discrepancy_of(at(best, data.wi, data.wo) * data.kappa, plain, first_discrepancy(plain)))
 
 
-_discrepancy = program(best_discrepancy)
+discrepancy_of = program(best_discrepancy)
+"""`best_discrepancy` as a program."""
 
 
 def named_outcome(usable: bool, solved: bool, on_bound: bool, undetermined: tuple[str, ...]) -> str:

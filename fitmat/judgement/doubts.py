@@ -12,6 +12,7 @@ from jaxtyping import Float
 from fitmat.fitting.information import MISSES
 from fitmat.fitting.losses import bad_probability
 from fitmat.fitting.result import Fit
+from fitmat.judgement import assumed_noise
 from fitmat.judgement.prediction import standardised_residuals
 from fitmat.maths import normal
 from fitmat.maths.directions import signed_zenith
@@ -90,7 +91,8 @@ def find_doubts(fit: Fit) -> Doubts:
         ratio = f"{fit.misfit_ratio:.2g} × the measurement noise"
         words.insert(0, f"{fit.name} is inadequate: it misses the data by {ratio}; {_pattern(fit)}.")
     elif not fit.noise.known:
-        words.append(f"Whether {fit.name} is adequate cannot be judged: the noise is not known.")
+        unknown = f"Whether {fit.name} is adequate cannot be judged: the noise is not known."
+        words.append(" ".join(filter(None, (unknown, assumed_noise.words(fit)))))
     contradicted = bool(noise or identical or (clashes and not fit.loss.robust))
     allowed = fit.loss.posterior and not contradicted and fit.correlation.found
     if (missed or contradicted) and fit.loss.posterior:

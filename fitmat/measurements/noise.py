@@ -8,6 +8,7 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
+from fitmat.measurements.alikeness import Alike, alike
 from fitmat.measurements.neighbours import leave_one_out
 from fitmat.measurements.samples import Measurements
 from fitmat.text import brief, visible
@@ -38,6 +39,9 @@ LEAST_SAID = 1e-5
 LEAST_SIGMA = 1e-9
 """Of the largest σ: what is smaller counts as this where a law of the noise is sought."""
 
+FREEDOM = 0.38
+"""Degrees of freedom of σ² for each comparison with neighbours: 70²/Σ acf² of fourth differences, 4900/12870."""
+
 _DIGITS = 8
 # So many digits behind the point are looked at; rounding to more is no noise that counts.
 _EXACT = 2.0**53
@@ -59,12 +63,14 @@ class Noise:
         known: False where nothing could be said and `sigma` is a placeholder.
         words: One sentence for the report.
         laws: a (sr⁻¹) and b per channel, where they were estimated, (c, 2).
+        rho: Correlation of the errors of neighbouring angles, where it was found.
     """
 
     sigma: Float[np.ndarray, "n c"]
     known: bool
     words: str
     laws: Float[np.ndarray, "c 2"] | None = None
+    rho: float = 0.0
 
     __repr__ = brief
 
@@ -74,14 +80,33 @@ def measured_noise(m: Measurements) -> Noise:
 
     The errors of predictions from repeats and neighbours (`leave_one_out`) give a and b by a Student-t likelihood, so
     that a few badly predicted peak samples do not count. σ is evaluated at the prediction, not at the sample itself:
-    weights that depend on the sample's own noise bias every fit.
+    weights that depend on the sample's own noise bias every fit. Errors that are alike along a curve (`alikeness`) make
+    the noise larger than neighbours show.
     """
     if m.sigma is not None:
         return Noise(np.where(m.valid, m.sigma, 1.0), True, "Measurement noise as given in the file.")
     compared = leave_one_out(m)
     smooth, tops = seen_levels(m, compared[0]), np.max(np.abs(m.value), axis=0, where=m.valid, initial=0.0)
     laws = np.stack([law(compared[:, :, k], m.value[m.valid[:, k], k]) for k in range(len(m.channels))])
-    return of_laws(laws, smooth, tops, m.channels)
+    together = alike(m, laws)
+    found = of_laws(laws * together.larger, smooth, tops, m.channels)
+    return dataclasses.replace(
+        found, words=" ".join([found.words, *_reservations(found, together, compared)]), rho=together.rho
+    )
+
+
+def _reservations(found: Noise, together: Alike, compared: np.ndarray) -> list[str]:
+    """How well an estimate is known, and on what it rests."""
+    if not found.known:
+        return []
+    if together.rho:
+        return [
+            f"Errors of neighbouring angles are alike (correlation {together.rho:.1f} from one to the next), which "
+            f"hides a part of them: the noise is about {together.larger:.1f} times what neighbours show."
+        ]
+    fewest = np.count_nonzero(np.isfinite(compared[1]), axis=0).min()
+    known = f"It is known to about {100.0 / np.sqrt(2.0 * FREEDOM * fewest):.0f} %"
+    return [f"{known}{'' if together.judged else ', if errors of neighbouring angles are independent'}."]
 
 
 def of_laws(laws: Float[np.ndarray, "c 2"], level: np.ndarray, tops: np.ndarray, channels: tuple[str, ...]) -> Noise:
