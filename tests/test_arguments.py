@@ -300,7 +300,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             "target": (None, *TEXT, "hlsl"),
             "folder": without(PATH, NOTHING),
             **dict.fromkeys(("model", "name"), TEXT),
-            **dict.fromkeys(("verify", "force"), FLAG),
+            **dict.fromkeys(("strict", "verify", "force"), FLAG),
         },
     ),
     "report": ({"study": STUDY, "folder": "/proc/x"}, {"study": NOUN, "folder": PATH, "force": FLAG}),

@@ -15,6 +15,7 @@ from fitmat.cli.flags.export import (
     OneModelFlag,
     ReplaceExportFlag,
     ResultFlag,
+    StrictFlag,
     TargetFlag,
 )
 from fitmat.cli.flags.files import (
@@ -219,6 +220,7 @@ def export(
     out: ExportOutFlag = None,
     model: OneModelFlag = None,
     name: MaterialNameFlag = None,
+    strict: StrictFlag = False,
     no_verify: NoVerifyFlag = False,
     force: ReplaceExportFlag = False,
 ) -> None:
@@ -226,7 +228,8 @@ def export(
     process.set_up()
     from fitmat.cli import export
 
-    process.say(str(export.written(result, to, out, model, name, verify=not no_verify, force=force)))
+    options = {"strict": strict, "verify": not no_verify, "force": force}
+    process.say(str(export.written(result, to, out, model, name, **options)))
 
 
 @app.command(cls=Command)

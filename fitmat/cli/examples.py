@@ -41,8 +41,9 @@ DESIGN = (
 
 EXPORT = (
     "Written to --out for glsl: NAME.glsl, the function vec3 brdf(vec3 wi, vec3 wo) to paste; NAME.vert and NAME.frag, "
-    "which light with it; export.json, its values and how far it is from the model.\n\n"
+    "which light with it; for mitsuba: NAME.py, the dictionary, and NAME.xml, a scene to include. With them "
+    "export.json, the values and how far the target's are from the model's.\n\n"
     "Examples:\n\n"
     "  fitmat export run1 --to glsl\n\n"
-    "  fitmat export run1 --model lambert+ggx --name 'satin plastic' --out shaders"
+    "  fitmat export run1 --to mitsuba --model lambert+ggx --name 'satin plastic' --out mine"
 )

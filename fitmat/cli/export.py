@@ -11,7 +11,7 @@ from fitmat.studies.result import RECORD, load
 
 
 def written(
-    run: Path, target: str, folder: Path | None, model: str | None, name: str | None, *, verify: bool, force: bool
+    run: Path, target: str, folder: Path | None, model: str | None, name: str | None, **options: bool
 ) -> Export:
     """Load a run and export one of its models.
 
@@ -21,8 +21,7 @@ def written(
         folder: Where to; None for one beside the run, with its name and the target's.
         model: Which model; None for the one that the data prefer.
         name: Of the material.
-        verify: Whether to run it.
-        force: Whether to replace an earlier export.
+        **options: strict, verify and force, as `fitmat.export`.
 
     Raises:
         FitmatError: as `fitmat.load` and `fitmat.export`.
@@ -30,4 +29,4 @@ def written(
     result = load(run)
     place = run.parent if run.name == RECORD else run
     target_folder = folder or files.default(place.resolve(), target)
-    return export(result, target, target_folder, model=model, name=name, verify=verify, force=force)
+    return export(result, target, target_folder, model=model, name=name, **options)

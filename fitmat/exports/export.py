@@ -7,19 +7,17 @@ import dataclasses
 import json
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from fitmat import arguments, files
 from fitmat.errors import ModelError, OutputError
-from fitmat.exports import browser
-from fitmat.exports.shaders import shaders
-from fitmat.exports.translation import translated
-from fitmat.exports.verification import TOLERANCE, Difference, difference
+from fitmat.exports import mitsuba, shaders, translation, verification
+from fitmat.exports.verification import TOLERANCE, Difference
 from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import entries, vector
@@ -31,8 +29,29 @@ if TYPE_CHECKING:
     from fitmat.fitting.result import Fit
     from fitmat.studies.study import Study
 
-TARGETS = {"glsl": "GLSL ES 3.00"}
-"""Targets by name: what they are."""
+
+class Target(NamedTuple):
+    """A renderer, or a language of renderers.
+
+    Attributes:
+        title: What it is, with its version.
+        translate: Model → its form there.
+        texts: Name of the files, header lines, form → file names and texts.
+        difference: Model, form → how far its values there are; None where nothing runs it.
+    """
+
+    title: str
+    translate: Callable[[AbstractBRDF], Any]
+    texts: Callable[[str, Sequence[str], Any], dict[str, str]]
+    difference: Callable[[AbstractBRDF, Any], Difference | None]
+    notes: Callable[[AbstractBRDF], Sequence[str]]
+
+
+TARGETS = {
+    "glsl": Target("GLSL ES 3.00", translation.translated, shaders.texts, verification.difference, lambda _: ()),
+    "mitsuba": Target("Mitsuba 3", mitsuba.translated, mitsuba.texts, mitsuba.difference, mitsuba.notes),
+}
+"""Targets by name."""
 
 RECORD = "export.json"
 
@@ -54,6 +73,7 @@ class Export:
         model: The model's name.
         files: File names → texts, last the record.
         difference: From the model, where it was run.
+        notes: In which conventions the target differs from the model, as sentences.
         folder: Where the files are, if they were written.
     """
 
@@ -61,6 +81,7 @@ class Export:
     model: str
     files: Mapping[str, str]
     difference: Difference | None
+    notes: tuple[str, ...] = ()
     folder: Path | None = None
 
     __repr__ = brief
@@ -68,7 +89,10 @@ class Export:
     def __str__(self) -> str:
         """What was written, and how far it is from the model."""
         where = "" if self.folder is None else f" in {self.folder}"
-        lines = [f"{', '.join(self.files)}{where}: {self.model} in {TARGETS[self.target]}.", _executed(self.difference)]
+        lines = [
+            f"{', '.join(self.files)}{where}: {self.model} in {TARGETS[self.target].title}.",
+            _executed(self.difference),
+        ]
         if self.difference is not None and self.difference.beyond:
             lines.append(f"{self.difference.beyond} directions are further apart than {TOLERANCE:g}.")
         return "\n".join(lines)
@@ -91,27 +115,30 @@ def export(
     *,
     model: str | None = None,
     name: str | None = None,
+    strict: bool = False,
     verify: bool = True,
     force: bool = False,
 ) -> Export:
     """Write a material for a renderer, run it there, and say how far it is from the model.
 
     GLSL: `NAME.glsl` holds the function `vec3 brdf(vec3 wi, vec3 wo)` to paste; `NAME.vert` and `NAME.frag` light with
-    it (uniforms mvpMatrix, mvMatrix, source, emission; attributes position at 0 and normal at 2); `export.json` holds
-    the values and the difference. What the instrument and a tilted mount did is not part of the material.
+    it (uniforms mvpMatrix, mvMatrix, source, emission; attributes position at 0 and normal at 2). Mitsuba: `NAME.py`
+    holds the dictionary, `NAME.xml` the same as a scene to include. `export.json` holds the values and the difference.
+    What the instrument and a tilted mount did is not part of the material.
 
     Args:
         material: A model, a fit, a study, or the result of one from `fitmat.load`.
-        target: "glsl".
+        target: "glsl" or "mitsuba".
         folder: Where to; it appears complete or not at all. None to write nothing.
         model: Which model of a study; None for the one that the data prefer.
         name: Of the material, and of the files; None for that of the measurements, or of the model.
-        verify: Whether to run it in Chromium, where there is one.
+        strict: Whether to refuse where the target has another convention than the model, instead of saying so.
+        verify: Whether to run it, in Chromium or in Mitsuba, where there is one.
         force: Replace the files of an earlier export in the folder.
 
     Raises:
         ModelError: a lobe cannot be translated, there are channels for which there are no colours, or no such model.
-        OutputError: the folder holds something and `force` is off, it cannot be written, or Chromium fails.
+        OutputError: the folder holds something and `force` is off, it cannot be written, or what runs it fails.
 
     Example:
         >>> import fitmat as fm
@@ -124,8 +151,10 @@ def export(
     arguments.kind("folder", folder, str, os.PathLike, optional=True)
     for key, text in (("model", model), ("name", name)):
         arguments.kind(key, text, str, optional=True)
-    arguments.flags(verify=verify, force=force)
+    arguments.flags(strict=strict, verify=verify, force=force)
     chosen = _chosen(material, model)
+    if strict and (different := TARGETS[target].notes(chosen.model)):
+        raise ModelError(f"{different[0]} Leave out strict to export it all the same.")
     called = name if name is not None else chosen.source or chosen.model.name
     if folder is None:
         return _made(chosen, target, called, verify=verify)
@@ -189,19 +218,19 @@ def _of_study(material: "Fit | Study", name: str | None) -> Chosen:
 
 
 def _made(chosen: Chosen, target: str, name: str, *, verify: bool) -> Export:
-    brdf = translated(chosen.model)
-    program = browser.program() if verify else None
-    found = None if program is None else difference(chosen.model, brdf, program)
-    header = "".join(f"// {line}\n" for line in _header(chosen, target, name, found))
-    texts = shaders(file_name(Path(name).stem if name == chosen.source else name), header, brdf)
+    made = TARGETS[target]
+    form = made.translate(chosen.model)
+    found = made.difference(chosen.model, form) if verify else None
+    called = file_name(Path(name).stem if name == chosen.source else name)
+    texts = made.texts(called, _header(chosen, target, name, found), form)
     record = plain(_record(chosen, target, name, list(texts), found))
     texts[RECORD] = json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    return Export(target, chosen.model.name, texts, found)
+    return Export(target, chosen.model.name, texts, found, tuple(made.notes(chosen.model)))
 
 
 def _header(chosen: Chosen, target: str, name: str, found: Difference | None) -> list[str]:
     """Lines of ASCII; names are quoted as JSON writes them, which ends no comment and no line."""
-    lines = [f"{json.dumps(name)}: {chosen.model.name}, {TARGETS[target]}, by fitmat {version('fitmat')}."]
+    lines = [f"{json.dumps(name)}: {chosen.model.name}, {TARGETS[target].title}, by fitmat {version('fitmat')}."]
     if chosen.source:
         lines.append(f"Fitted to {json.dumps(chosen.source)}.")
     if len(chosen.channels) == 3:
@@ -210,7 +239,7 @@ def _header(chosen: Chosen, target: str, name: str, found: Difference | None) ->
     known = [words for q in chosen.parameters if q.name in of_model for words in _interval(q)]
     if known:
         lines += ["95 % intervals:", *(f"  {words}" for words in known)]
-    return [*lines, *_executed(found).split("\n")]
+    return [*lines, *TARGETS[target].notes(chosen.model), *_executed(found).split("\n")]
 
 
 def _interval(q: Quantity) -> list[str]:
@@ -228,12 +257,13 @@ def _record(chosen: Chosen, target: str, name: str, names: Sequence[str], found:
         "format": FORMAT,
         "fitmat": version("fitmat"),
         "target": target,
-        "version": TARGETS[target],
+        "version": TARGETS[target].title,
         "name": name,
         "source": chosen.source,
         "model": chosen.model.name,
         "channels": list(chosen.channels),
         "values": {e.name: values[e.place] if e.shape else values[e.place][0] for e in entries(chosen.model)},
         "files": list(names),
+        "notes": list(TARGETS[target].notes(chosen.model)),
         "executed": None if found is None else dataclasses.asdict(found),
     }

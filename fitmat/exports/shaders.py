@@ -3,6 +3,8 @@
 It translates nothing and runs nothing.
 """
 
+from collections.abc import Sequence
+
 VERTEX = """#version 300 es
 uniform mat4 mvpMatrix;  // object to clip space
 uniform mat4 mvMatrix;   // object to the frame of the eye
@@ -45,18 +47,19 @@ void main() {
 """
 
 
-def shaders(name: str, header: str, brdf: str) -> dict[str, str]:
+def texts(name: str, header: Sequence[str], brdf: str) -> dict[str, str]:
     """File names → texts.
 
     Args:
         name: Of the files, without their ending.
-        header: Comment lines that each begins with; in shaders after the version, which must come first.
+        header: Lines that each begins with as comments; in shaders after the version, which must come first.
         brdf: By `translation.translated`.
     """
+    comment = "".join(f"// {line}\n" for line in header)
     version, rest = BEFORE.split("\n", 1)
     _, vertex = VERTEX.split("\n", 1)
     return {
-        f"{name}.glsl": header + "\n" + brdf,
-        f"{name}.vert": f"{version}\n{header}{vertex}",
-        f"{name}.frag": f"{version}\n{header}{rest}{brdf}{AFTER}",
+        f"{name}.glsl": comment + "\n" + brdf,
+        f"{name}.vert": f"{version}\n{comment}{vertex}",
+        f"{name}.frag": f"{version}\n{comment}{rest}{brdf}{AFTER}",
     }

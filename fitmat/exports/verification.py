@@ -108,17 +108,19 @@ def _singular() -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([wi, wi, wi, up]), np.concatenate([mirror(wi), wi, up, wi])
 
 
-def difference(model: AbstractBRDF, source: str, program: str) -> Difference:
-    """How far a source's `brdf` is from its model.
+def difference(model: AbstractBRDF, source: str) -> Difference | None:
+    """How far a source's `brdf` is from its model; None without a browser.
 
     Args:
         model: Of one or three channels.
         source: In GLSL ES 3.00, with a function `vec3 brdf(vec3 wi, vec3 wo)`.
-        program: The browser's.
 
     Raises:
         OutputError: the browser does not run, or the source does not compile.
     """
+    program = browser.program()
+    if program is None:
+        return None
     wi, wo = directions()
     (values,), executor = run([source], wi, wo, program)
     return compared(values, evaluate(model, *exact(wi, wo)), wi, wo, executor)
@@ -153,10 +155,12 @@ def compared(
     wi: Float[np.ndarray, "n 3"],
     wo: Float[np.ndarray, "n 3"],
     executor: str,
+    *,
+    least: float = LEAST,
 ) -> Difference:
-    """Values of a shader beside the model's own; what is not finite differs infinitely."""
+    """Values of an export beside the model's own; what is not finite differs infinitely."""
     with np.errstate(invalid="ignore"):
-        apart = np.abs(found - expected) / np.maximum(np.abs(expected), LEAST)
+        apart = np.abs(found - expected) / np.maximum(np.abs(expected), least)
     apart = np.where(np.isfinite(apart), apart, np.inf).max(axis=1)
     worst, lit = int(np.argmax(apart)), (wi[:, 2] > 0) & (wo[:, 2] > 0)
     light, eye = (w[worst : worst + 1] for w in exact(wi, wo))

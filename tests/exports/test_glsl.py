@@ -287,17 +287,19 @@ def test_what_a_shader_cannot_hold_is_refused(build: Callable[[], AbstractBRDF],
 def test_a_browser_that_fails_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     model = fm.model("lambert")
     for program, sentence in [("/nowhere/chromium", r"cannot run a shader \(No such file"), ("true", "wrote nothing")]:
+        monkeypatch.setattr(browser, "program", lambda program=program: program)
         with pytest.raises(OutputError, match=sentence):
-            verification.difference(model, translated(model), program)
+            verification.difference(model, translated(model))
     monkeypatch.setattr(browser, "PATIENCE", 0.2)
+    monkeypatch.setattr(browser, "program", lambda: "sh")
     monkeypatch.setattr(browser, "FLAGS", ("-c", "sleep 60 #"))
     with pytest.raises(OutputError, match=r"it did not end within 0\.2 s"):
-        verification.difference(model, translated(model), "sh")
+        verification.difference(model, translated(model))
 
 
 @pytest.mark.study
 def test_a_shader_that_does_not_compile_is_said() -> None:
+    chromium()
+    wrong = translated(fm.model("lambert")).replace("lambert_kd /", "kd /")
     with pytest.raises(OutputError, match=r"the shader cannot be run \(ERROR: 0:\d+: 'kd' : undeclared identifier"):
-        verification.difference(
-            fm.model("lambert"), translated(fm.model("lambert")).replace("lambert_kd /", "kd /"), chromium()
-        )
+        verification.difference(fm.model("lambert"), wrong)

@@ -10,7 +10,7 @@ import typer
 
 ResultFlag = Annotated[Path, typer.Argument(help="Folder of a run of fitmat fit, or the fit.json in it.")]
 
-TargetFlag = Annotated[str, typer.Option("--to", help="What it is written for: glsl.", metavar="TARGET")]
+TargetFlag = Annotated[str, typer.Option("--to", help="What it is written for: glsl or mitsuba.", metavar="TARGET")]
 
 ExportOutFlag = Annotated[
     Path | None,
@@ -32,8 +32,15 @@ MaterialNameFlag = Annotated[
     typer.Option(help="Name of the material, and of its files; default that of the measurements.", show_default=False),
 ]
 
+StrictFlag = Annotated[
+    bool, typer.Option("--strict", help="Refuse where the target has another convention than the model; else say so.")
+]
+
 NoVerifyFlag = Annotated[
-    bool, typer.Option("--no-verify", help="Do not run what was written; else Chromium runs it, where there is one.")
+    bool,
+    typer.Option(
+        "--no-verify", help="Do not run what was written; else Chromium, or Mitsuba, runs it where there is one."
+    ),
 ]
 
 ReplaceExportFlag = Annotated[bool, typer.Option("--force", help="Replace the files of an earlier export in --out.")]
