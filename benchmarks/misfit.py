@@ -1,10 +1,10 @@
 """Shows that intervals hold when the model is wrong: two laboratories measure one surface, and must agree.
 
 Six families of surfaces that neither default model describes × four splits of the angles between two laboratories. Each
-fits both models; every parameter, ks·F0, albedos and the distance of the match of one are compared with those of the
-other: the 95 % interval of their difference should hold 0 in 95 of 100 surfaces. The truth itself will not serve, for a
-wrong model has none. A right model is compared with the truth. All is judged twice: with the correlation of the misfit,
-and as if the misfit of every sample were its own. Writes misfit.md and misfit.png beside this script.
+fits both models; every parameter, ks·F0, albedos, the distance and ΔE of the match of one are compared with those of
+the other: the 95 % interval of their difference should hold 0 in 95 of 100 surfaces. The truth itself will not serve,
+for a wrong model has none. A right model is compared with the truth. All is judged twice: with the correlation of the
+misfit, and as if the misfit of every sample were its own. Writes misfit.md and misfit.png beside this script.
 
 Every surface is kept as it comes; an interrupted run goes on from there, and a finished one only draws.
 
@@ -27,12 +27,14 @@ import platformdirs
 from wrong_truths import FAMILIES, RIGHT, SPLITS, Laboratory, surface
 
 import fitmat as fm
+from fitmat.match.appearance.spheres import SPHERE_DRAWS, perceived
 from fitmat.maths.directions import from_angles
+from fitmat.maths.normal import Z95
 from fitmat.maths.quadrature import lobe_rule
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.terms.fresnel import f0_from_eta
 from fitmat.models.values import values
-from fitmat.uncertainty.estimate import limits
+from fitmat.uncertainty.estimate import Estimate, limits
 
 MODELS = ("lambert+blinn-phong", "lambert+ggx")
 
@@ -46,6 +48,9 @@ ALBEDO_DEG = (20.0, 50.0, 70.0)
 
 NODES = (32, 16)
 """Of the quadratures, the same for both laboratories, whose error they share."""
+
+SPHERES = 1
+"""Surfaces of each family and split whose ΔE is compared as well: a pair of spheres takes as long as a fit."""
 
 RINGS_DEG = (7.0, 21.0, 35.0, 49.0, 63.0, 77.0)
 """Incidences over which the distance of the match is taken."""
@@ -80,13 +85,16 @@ def judged(case: Case, method: str = "laplace") -> dict[str, Any]:
     """Both laboratories of a case; see `misfit_pages`."""
     rng = np.random.default_rng([case.seed, zlib.crc32(case.key.encode())])
     brdf, truth = surface(case.family, rng)
-    labs = [_quantities(_posteriors(lab, brdf, rng, method)) for lab in SPLITS[case.split]]
+    posteriors = [_posteriors(lab, brdf, rng, method) for lab in SPLITS[case.split]]
+    labs = [_quantities(of_one) for of_one in posteriors]
     found: dict[str, Any] = {"case": case.key, "family": case.family, "split": case.split, "method": method}
     if case.family == RIGHT:
         true = _true(truth)
         found["rows"] = [row for lab in labs for row in _against(lab, true)]
     else:
         found["rows"] = list(_between(*labs))
+        if case.number < SPHERES and all(p.fit.finite for of_one in posteriors for p in of_one):
+            found["rows"].append(_seen_between(*(_seen(of_one) for of_one in posteriors)))
     return found
 
 
@@ -149,6 +157,27 @@ def _distance(models: tuple[AbstractBRDF, AbstractBRDF], drawn: tuple[np.ndarray
         one, other = (values(m, d, wi, rule.wo)[:, :, 0] for m, d in zip(models, drawn, strict=True))
         top, bottom = top + ring * ((one - other) ** 2 @ rule.weight), bottom + ring * (other**2 @ rule.weight)
     return np.sqrt(top / bottom)
+
+
+def _seen(posteriors: list[fm.Posterior]) -> dict[str, Estimate]:
+    """What an eye sees of the difference of the two models, mean ΔE2000 of spheres."""
+    found = {}
+    for kind in ("wide", "plain"):
+        draws = [np.vstack([p.fit.values, p.thinned(SPHERE_DRAWS, widened=kind == "wide")[0]]) for p in posteriors]
+        models, channels = [p.fit.model for p in posteriors], posteriors[0].fit.measurements.channels
+        found[kind] = perceived(*models, (draws[0], draws[1]), channels, pictures=False).delta_e_2000.mean
+    return found
+
+
+def _seen_between(one: dict[str, Estimate], other: dict[str, Estimate]) -> dict[str, Any]:
+    """As `_between`, the interval of the difference from both intervals (Zou & Donner, Stat. Med. 27, 2008)."""
+    row: dict[str, Any] = {"quantity": "match ΔE2000", "apart": one["wide"].value - other["wide"].value}
+    for kind in ("wide", "plain"):
+        a, b = one[kind], other[kind]
+        below = np.hypot(a.value - a.ci95[0], b.ci95[1] - b.value)
+        above = np.hypot(a.ci95[1] - a.value, b.value - b.ci95[0])
+        row |= {kind: bool(-above <= a.value - b.value <= below), f"{kind} sd": float((below + above) / (2.0 * Z95))}
+    return row
 
 
 def _between(one: dict[str, Numbers], other: dict[str, Numbers]) -> Iterator[dict[str, Any]]:

@@ -30,7 +30,8 @@ PAGE = """# Do the intervals hold when the model is wrong?
 {surfaces:,} surfaces that neither default model describes, each measured by two laboratories at other angles (noise
 {noise}). If the intervals are honest, that of the difference of the two results holds 0 in 95 of 100 cases. The truth
 will not serve for this: a wrong model has none, and each set of angles has a best fit of its own. Compared are the
-parameters that both determine and that lie on no bound, ks·F0, albedos at 20, 50 and 70°, and the match's distance.
+parameters that both determine and that lie on no bound, ks·F0, albedos at 20, 50 and 70°, and the match's distance; of
+{spheres} surfaces also what an eye sees of the difference of the two models on a lit sphere, mean ΔE2000.
 
 {families}
 
@@ -90,6 +91,7 @@ def write(found: Sequence[Line], out: Path, seed: int) -> None:
     ratios = _ratios(found)
     page = PAGE.format(
         surfaces=len({row["case"] for row in wrong}),
+        spheres=len({row["case"] for row in wrong if row["quantity"] == "match ΔE2000"}),
         noise="1 % + 5e-4 sr⁻¹",
         families="\n".join(f"- **{name}**: {words}" for name, words in FAMILIES.items()),
         verdict=_verdict(wrong, right),

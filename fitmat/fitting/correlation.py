@@ -1,16 +1,18 @@
 """Correlation: how alike the misfits of neighbouring geometries are, and how much wider that makes every interval.
 
 A likelihood that counts the misfit of each sample as independent gets narrower with every reading, however alike the
-misfits of neighbours are. Here the residuals of a finished fit are taken as noise plus a smooth process over the
-geometry, η² I + τ² K. Both sizes are found by restricted maximum likelihood, which allows for the parameters that were
-fitted (Patterson & Thompson, Biometrika 58, 1971), each channel by itself; how well τ is known is allowed for by
-Student's t. The covariance of the parameters becomes
+misfits of neighbours are. Here the residuals of a finished fit are taken as noise plus smooth processes over the
+geometry, η² I + Σ τ² K: one within `NEAR` widths of the lobe, one beyond, for a misfit of the highlight says nothing of
+the base. All sizes are found by restricted maximum likelihood, which allows for the parameters that were fitted
+(Patterson & Thompson, Biometrika 58, 1971), each channel by itself; how well τ is known is allowed for by Student's t.
+The covariance of the parameters becomes
 
-    V = H⁻¹ Jᵀ(η² I + τ² K) J H⁻¹,
+    V = H⁻¹ Jᵀ(η² I + Σ τ² n/m I) J H⁻¹,
 
-Huber's sandwich (1967) with a meat that is modelled, and never narrower than H⁻¹ in any direction. Draws θ become
-θ̂ + A(θ − θ̂) with A H⁻¹ Aᵀ = V (Shaby, "The open-faced sandwich adjustment for MCMC using estimating functions",
-J. Comp. Graph. Stat. 23, 2014), so that whatever follows from draws follows from these. The best fit stays.
+Huber's sandwich (1967) with a meat that is modelled: the n readings of a part count as the m = (tr K)²/tr K² that are
+independent (`process.meat`). It is never narrower than H⁻¹ in any direction. Draws θ become θ̂ + A(θ − θ̂) with
+A H⁻¹ Aᵀ = V (Shaby, "The open-faced sandwich adjustment for MCMC using estimating functions", J. Comp. Graph. Stat. 23,
+2014), so that whatever follows from draws follows from these. The best fit stays.
 
 K is Matérn's of smoothness 3/2 over where the half vector lies about the normal, at distance asinh(θ_h/w) with the
 lobe's width w (an even scale up to one width, ratios beyond) and at its azimuth from the plane of incidence, and over
@@ -20,11 +22,11 @@ the difference angle θ_d. Its lengths are fixed: free ones follow chance. It kn
 import dataclasses
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from fitmat.fitting.coordinates import Coordinates
 from fitmat.fitting.likelihood import Data, inferred_noise, misfits
-from fitmat.fitting.process import ASKED, factor, find, independent, meat
+from fitmat.fitting.process import ASKED, counted, find, independent, kernel, meat
 from fitmat.maths.directions import zenith
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector
@@ -36,6 +38,12 @@ LENGTHS = 1.0, 1.0, 0.8
 
 Those that describe the residuals of six families of wrong surfaces best, all fits of a family taken together.
 """
+
+NEAR = 3.0
+"""Widths of the lobe within which a half vector counts as near the highlight; describes the same residuals best."""
+
+PLACES = "near the highlight", "away from the highlight"
+"""The parts of the geometry, in the order of `Correlation.size`."""
 
 ROWS = 4096
 """Of more rows an evenly spread part stands for all: what the process adds does not shrink with more of them."""
@@ -49,7 +57,9 @@ class Correlation:
     """What the residuals of a fit say of the correlation of its misfit.
 
     Attributes:
-        size: τ of each channel, in standard deviations of its residuals as the likelihood counts them, (c,).
+        size: τ of each channel near the highlight and away from it, in standard deviations of its residuals as the
+            likelihood counts them, (c, 2).
+        near: Share of the readings that lie near the highlight.
         gain: By how many nats the process describes the residuals better, (c,).
         stretch: A, in natural coordinates of the k fitted parameters, (k, k); the identity where nothing was found.
         inflation: Of the variance of each fitted parameter, (k,).
@@ -57,7 +67,8 @@ class Correlation:
         outcome: "independent", "correlated", or "not judged".
     """
 
-    size: Float[np.ndarray, " c"]
+    size: Float[np.ndarray, "c 2"]
+    near: float
     gain: Float[np.ndarray, " c"]
     stretch: Float[np.ndarray, "k k"]
     inflation: Float[np.ndarray, " k"]
@@ -70,6 +81,15 @@ class Correlation:
     def found(self) -> bool:
         """Whether any interval changes."""
         return self.outcome == "correlated"
+
+    @property
+    def shared(self) -> str:
+        """Where the model misses what neighbours have in common, as part of a sentence; empty where only noise is."""
+        asked = np.any(self.size > 0.0, axis=0)
+        if not asked.any():
+            return ""
+        where = f"{PLACES[int(asked[1])]} " if asked.sum() == 1 and 0.0 < self.near < 1.0 else ""
+        return f"{where}neighbouring angles share a misfit"
 
 
 def correlate(
@@ -106,9 +126,11 @@ def correlate(
     if not np.isfinite(np.where(used, r, 0.0)).all() or not r[used].any():
         return none
     more, slopes = count / np.count_nonzero(used), np.where(used[:, :, None], slopes, 0.0)
-    root, left = factor(_places(best, data), np.any(used, axis=1))
-    found = find(r, slopes, used, root)
-    asked, half = found.gain >= ASKED, np.linalg.solve(h, meat(found, slopes, (root, left), more))
+    places, near = _places(best, data)
+    some = np.any(used, axis=1)
+    parts = kernel(places, np.stack([some & near, some & ~near]))
+    found, counts = find(r, slopes, used, parts), counted(used, parts)
+    asked, half = found.gain >= ASKED, np.linalg.solve(h, meat(found, slopes, counts, parts.rows, more))
     ratio, axes = np.linalg.eigh(np.linalg.solve(h, half.T))
     least = 1.0 + 2.0 * rho / (1.0 - rho) / (1.0 + s / float(data.typical)) ** 2
     if least == 1.0 and (not asked.any() or ratio[-1] <= 1.0):
@@ -118,8 +140,8 @@ def correlate(
     wide = np.linalg.solve(h.T, axes * np.sqrt(np.maximum(ratio, least)))
     stretch[np.ix_(inside, inside)] = wide @ axes.T @ h.T
     inflation[inside] = np.sum(wide**2, axis=1) / np.sum(np.linalg.inv(h) ** 2, axis=0)
-    alike = min(independent(found, used, root, more), count / least)
-    return Correlation(found.size, found.gain, stretch, inflation, alike, "correlated")
+    share, alone = float(np.mean(near[some])), min(independent(found, counts, more), count / least)
+    return Correlation(found.size, share, found.gain, stretch, inflation, alone, "correlated")
 
 
 def _known(
@@ -136,7 +158,7 @@ def _known(
 
 def _unchanged(data: Data, parameters: int, count: int) -> Correlation:
     channels = data.x.shape[1]
-    parts = np.zeros(channels), np.full(channels, np.nan), np.eye(parameters), np.ones(parameters)
+    parts = np.zeros((channels, 2)), np.nan, np.full(channels, np.nan), np.eye(parameters), np.ones(parameters)
     return Correlation(*parts, float(count), "not judged")
 
 
@@ -155,11 +177,12 @@ def _linearised(
     return r[-1], np.moveaxis((r[k : 2 * k] - r[:k]) / apart[:, None, None], 0, -1)
 
 
-def _places(best: AbstractBRDF, data: Data) -> Float[np.ndarray, "n 3"]:
-    """Where the samples lie, in lengths of K."""
+def _places(best: AbstractBRDF, data: Data) -> tuple[Float[np.ndarray, "n 3"], Bool[np.ndarray, " n"]]:
+    """Where the samples lie, in lengths of K, and which of them near the highlight."""
     width = float(widths(best, np.asarray(vector(best))[None])[0])
     wi, h = np.asarray(data.wi), np.asarray(data.wi) + np.asarray(data.wo)
     h = h / np.linalg.norm(h, axis=1, keepdims=True)
     theta_d = np.arccos(np.clip(np.sum(wi * h, axis=1), -1.0, 1.0))
-    far, turn = np.arcsinh(zenith(h) / width), np.arctan2(h[:, 1], h[:, 0]) - np.arctan2(wi[:, 1], wi[:, 0])
-    return np.stack([far * np.cos(turn), far * np.sin(turn), theta_d], axis=1) / LENGTHS
+    away, turn = np.asarray(zenith(h)) / width, np.arctan2(h[:, 1], h[:, 0]) - np.arctan2(wi[:, 1], wi[:, 0])
+    far = np.arcsinh(away)
+    return np.stack([far * np.cos(turn), far * np.sin(turn), theta_d], axis=1) / LENGTHS, away <= NEAR

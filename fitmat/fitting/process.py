@@ -1,8 +1,9 @@
-"""Process: residuals as noise plus a smooth process over the geometry, Σ = η² I + τ² K, without a matrix of all pairs.
+"""Process: residuals as noise plus smooth processes over parts of the geometry, Σ = η² I + Σ τ² K, without all pairs.
 
 It knows no model and no fit.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from jaxtyping import Bool, Float
 from fitmat.maths.normal import Z95
 
 RANK = 160
-"""Most columns of the pivoted Cholesky factor that stands for K."""
+"""Most columns of the pivoted Cholesky factor that stands for the K of a part."""
 
 LEFT_OVER = 1e-3
 """Mean of the diagonal of K that the factor may leave over."""
@@ -19,18 +20,25 @@ LEFT_OVER = 1e-3
 FEWEST = 20
 """Values beyond the parameters from which on a process can be told from chance: of twelve readings never was."""
 
-RATIOS = np.concatenate([[0.0], np.logspace(-4.0, 6.0, 121)])
-"""τ²/η² that are tried."""
+COARSE = np.concatenate([[0.0], np.logspace(-4.0, 6.0, 41)])
+"""τ²/η² that are tried of each part."""
+
+FINE = np.logspace(-0.25, 0.25, 13)
+"""Times the best of these, that are tried then."""
+
+BEND = 1.25
+"""Factor of τ² over which the curvature of the likelihood is taken."""
 
 ASKED = 3.0
-"""Nats by which the process must raise the restricted likelihood; below, it is left out and no interval changes.
+"""Nats by which the processes must raise the restricted likelihood; below, they are left out and no interval changes.
 
-Chance alone does that in one right model of 140 (½χ₀² + ½χ₁²: Self & Liang 1987).
+So must a second part beside the first, else the first stands alone. Chance alone does that in one right model of 140
+for each part (½χ₀² + ½χ₁²: Self & Liang 1987).
 """
 
 
 class Found(NamedTuple):
-    """Of each channel: η², τ, τ² with what is not known of it, and nats, all (c,)."""
+    """Of each channel: η², (c,), τ and τ² with what is not known of it of each part, (c, b), and nats, (c,)."""
 
     white: np.ndarray
     size: np.ndarray
@@ -38,44 +46,87 @@ class Found(NamedTuple):
     gain: np.ndarray
 
 
+class Kernel(NamedTuple):
+    """K of each of b parts of n places.
+
+    Attributes:
+        rows: Which places belong to a part, (b, n); no place to two.
+        roots: L of K ≈ L Lᵀ, (n, m) each, 0 at the other parts.
+    """
+
+    rows: Bool[np.ndarray, "b n"]
+    roots: tuple[np.ndarray, ...]
+
+
+def kernel(places: Float[np.ndarray, "n d"], rows: Bool[np.ndarray, "b n"]) -> Kernel:
+    """Matérn's of each part."""
+    return Kernel(rows, tuple(factor(places, part) for part in rows))
+
+
 def find(
-    r: Float[np.ndarray, "n c"],
-    slopes: Float[np.ndarray, "n c i"],
-    used: Bool[np.ndarray, "n c"],
-    root: Float[np.ndarray, "n m"],
+    r: Float[np.ndarray, "n c"], slopes: Float[np.ndarray, "n c i"], used: Bool[np.ndarray, "n c"], k: Kernel
 ) -> Found:
     """The sizes of each channel; one whose residuals ask for no process counts as its likelihood has it."""
-    channels = r.shape[1]
-    found = Found(np.ones(channels), np.zeros(channels), np.zeros(channels), np.full(channels, np.nan))
-    for k in range(channels):
-        these = used[:, k]
-        basis = _basis(slopes[these, k])
+    channels, parts = r.shape[1], len(k.roots)
+    none = np.zeros((channels, parts)), np.zeros((channels, parts)), np.full(channels, np.nan)
+    found = Found(np.ones(channels), *none)
+    for j in range(channels):
+        these = used[:, j]
+        basis = _basis(slopes[these, j])
         if np.count_nonzero(these) < basis.shape[1] + FEWEST:
             continue
-        one = sizes(r[these, k], basis, root[these])
-        found.gain[k] = one.gain
+        one = sizes(r[these, j], basis, [root[these] for root in k.roots])
+        found.gain[j] = one.gain
         if one.gain >= ASKED:
-            found.white[k], found.size[k], found.allowance[k] = one.white, np.sqrt(one.process), one.allowance
+            found.white[j], found.size[j], found.allowance[j] = one.white, np.sqrt(one.process), one.allowance
     return found
 
 
+class Counts(NamedTuple):
+    """How many values there are, and how alike.
+
+    Attributes:
+        every: Of each channel, (c,).
+        part: Of each channel and part, (c, b), which is tr K.
+        alike: tr K² of these, (c, b).
+    """
+
+    every: np.ndarray
+    part: np.ndarray
+    alike: np.ndarray
+
+
+def counted(used: Bool[np.ndarray, "n c"], k: Kernel) -> Counts:
+    """The values in use, and of how many each is like; channels of the same values at once."""
+    known: dict[bytes, list[float]] = {}
+    for mask in used.T:
+        if mask.tobytes() not in known:
+            parts = [root[mask] for root in k.roots]
+            known[mask.tobytes()] = [float(np.sum((part.T @ part) ** 2)) for part in parts]
+    alike = np.array([known[mask.tobytes()] for mask in used.T])
+    return Counts(used.sum(axis=0), used.T.astype(float) @ k.rows.T, alike)
+
+
 def meat(
-    found: Found, slopes: Float[np.ndarray, "n c i"], kernel: tuple[np.ndarray, np.ndarray], more: float
+    found: Found, slopes: Float[np.ndarray, "n c i"], counts: Counts, rows: Bool[np.ndarray, "b n"], more: float
 ) -> Float[np.ndarray, "i i"]:
-    """Jᵀ Σ J of `more` times as many values, K as from `factor`; the channels' misfits count as one."""
-    root, left = kernel
-    single = found.white + left[:, None] * found.allowance
-    shared = more * np.einsum("nm,nci,c->mi", root, slopes, np.sqrt(found.allowance), optimize=True)
-    return more * np.einsum("nci,nc,ncj->ij", slopes, single, slopes, optimize=True) + shared.T @ shared
+    """Jᵀ Σ J of `more` times as many values, where every reading of a part stands for as many as are like it.
+
+    A part's n readings count as m = (tr K)²/tr K² independent ones: Kish's design effect n/m, "Survey Sampling" (1965),
+    ch. 8.2. Jᵀ K J itself would take the misfit to be as unlike a change of the parameters as K's smoothness lets it
+    be; but what a fit has absorbed was like one, and is not seen in its residuals. The channels' misfits count as one.
+    """
+    repeats = np.divide(counts.alike, counts.part, out=np.zeros_like(counts.alike), where=counts.part > 0)
+    shared = more * np.einsum("nci,cn->ni", slopes, np.sqrt(found.allowance * repeats) @ rows, optimize=True)
+    return more * np.einsum("nci,c,ncj->ij", slopes, found.white, slopes, optimize=True) + shared.T @ shared
 
 
-def independent(found: Found, used: Bool[np.ndarray, "n c"], root: Float[np.ndarray, "n m"], more: float) -> float:
+def independent(found: Found, counts: Counts, more: float) -> float:
     """(tr Σ)²/tr Σ² of `more` times as many values."""
-    count, process = used.sum(axis=0), found.size**2
-    grams = np.einsum("nm,nc,nk->mk", root, used * process, root, optimize=True)
-    trace = more * count @ (found.white + process)
-    square = more * count @ (found.white**2 + 2.0 * found.white * process) + more**2 * np.sum(grams**2)
-    return float(trace**2 / square)
+    process = found.size**2
+    trace = more * (counts.every @ found.white + np.sum(counts.part * process))
+    square = counts.every @ found.white**2 + 2.0 * found.white @ np.sum(counts.part * process, axis=1)
+    return float(trace**2 / (more * square + more**2 * np.sum(counts.alike * process**2)))
 
 
 def _basis(slopes: Float[np.ndarray, "n i"]) -> Float[np.ndarray, "n k"]:
@@ -87,10 +138,8 @@ def _basis(slopes: Float[np.ndarray, "n i"]) -> Float[np.ndarray, "n k"]:
     return u[:, w > 1e-8 * w[0]]
 
 
-def factor(
-    places: Float[np.ndarray, "n d"], rows: Bool[np.ndarray, " n"]
-) -> tuple[Float[np.ndarray, "n m"], Float[np.ndarray, " n"]]:
-    """L with K ≈ L Lᵀ by Cholesky's method with pivots, and what it leaves of the diagonal.
+def factor(places: Float[np.ndarray, "n d"], rows: Bool[np.ndarray, " n"]) -> Float[np.ndarray, "n m"]:
+    """L with K ≈ L Lᵀ by Cholesky's method with pivots.
 
     Harbrecht, Peters & Schneider, Applied Numerical Mathematics 62 (2012): each column takes the place that is known
     least. Repeated places, of which K is singular, end it early.
@@ -108,9 +157,9 @@ def factor(
         columns[count] = row / np.sqrt(left[pivot])
         left = np.maximum(left - columns[count] ** 2, 0.0)
         left[pivot], count = 0.0, count + 1
-    root, over = np.zeros((len(places), count)), np.zeros(len(places))
-    root[where], over[where] = columns[:count].T, left
-    return root, over
+    root = np.zeros((len(places), count))
+    root[where] = columns[:count].T
+    return root
 
 
 def matern(distance: np.ndarray) -> np.ndarray:
@@ -120,48 +169,93 @@ def matern(distance: np.ndarray) -> np.ndarray:
 
 
 class Sizes(NamedTuple):
-    """Of noise and process.
+    """Of noise and of the process of each of b parts.
 
     Attributes:
         white: η².
-        process: τ².
-        gain: Nats over τ = 0.
-        freedom: Degrees of freedom with which τ² is known, as of the mean of so many squares: −2 d²ℓ/d(ln τ²)².
+        process: τ², (b,).
+        gain: Nats over no process at all.
+        freedom: Degrees of freedom with which τ² is known, as of the mean of so many squares, (b,): −2 d²ℓ/d(ln τ²)².
     """
 
     white: float
-    process: float
+    process: np.ndarray
     gain: float
-    freedom: float
+    freedom: np.ndarray
 
     @property
-    def allowance(self) -> float:
+    def allowance(self) -> Float[np.ndarray, " b"]:
         """τ² with what is not known of it: intervals of Student's t, not of the normal distribution."""
         from scipy.special import stdtrit
 
-        return self.process * float(stdtrit(max(self.freedom, 1.5), 0.975) / Z95) ** 2
+        return self.process * (stdtrit(np.maximum(self.freedom, 1.5), 0.975) / Z95) ** 2
 
 
-def sizes(r: Float[np.ndarray, " n"], basis: Float[np.ndarray, "n k"], root: Float[np.ndarray, "n m"]) -> Sizes:
-    """Noise and process of residuals, by restricted maximum likelihood.
+def sizes(
+    r: Float[np.ndarray, " n"], basis: Float[np.ndarray, "n k"], roots: Sequence[Float[np.ndarray, "n m"]]
+) -> Sizes:
+    """Noise and processes of residuals, by restricted maximum likelihood; parts that hardly raise it are left out.
 
     Args:
         r: Residuals.
         basis: Orthonormal columns that span the slopes of the fitted parameters.
-        root: L of K ≈ L Lᵀ.
+        roots: L of K ≈ L Lᵀ of each part, whose rows are 0 at the other parts.
     """
-    w, v = np.linalg.eigh(root.T @ root)
-    kept = w > 1e-12 * w[-1]
-    w, u = w[kept], root @ (v[:, kept] / np.sqrt(w[kept]))
+    parts, places = [_Part.of(r, basis, root) for root in roots], range(len(roots))
+    tried = [COARSE if len(part.power) else COARSE[:1] for part in parts]
+    logs = kept = _likelihood(parts, tried, r, basis)[0]
+    without = [logs.take([0], axis=b) for b in places]
+    least = max(places, key=lambda b: without[b].max())
+    if len(parts) > 1 and logs.max() - without[least].max() < ASKED:
+        tried[least], kept = COARSE[:1], without[least]
+    tried = [x * FINE if x else COARSE[:1] for x in _best(kept, tried)]
+    best = _best(_likelihood(parts, tried, r, basis)[0], tried)
+    about, white = _likelihood(parts, [x * np.array([1.0 / BEND, 1.0, BEND]) for x in best], r, basis)
+    bent = [np.diff(about, 2, axis=b)[tuple(int(j != b) for j in places)] for b in places]
+    middle = (1,) * len(parts)
+    level, gain = float(white[middle]), float(about[middle] - logs.flat[0])
+    return Sizes(level, np.array(best) * level, gain, -2.0 * np.array(bent) / np.log(BEND) ** 2)
+
+
+def _best(logs: np.ndarray, tried: Sequence[np.ndarray]) -> list[float]:
+    """The ratio of each part where the likelihood is greatest."""
+    return [float(t[j]) for t, j in zip(tried, np.unravel_index(np.argmax(logs), logs.shape), strict=True)]
+
+
+class _Part(NamedTuple):
+    """A process in its own axes: the eigenvalues of K, (m,), and residuals and slopes along them, (m,) and (m, k)."""
+
+    power: np.ndarray
+    residual: np.ndarray
+    slope: np.ndarray
+
+    @classmethod
+    def of(cls, r: np.ndarray, basis: np.ndarray, root: np.ndarray) -> "_Part":
+        w, v = np.linalg.eigh(root.T @ root)
+        kept = w > 1e-12 * w.max(initial=0.0)
+        u = root @ (v[:, kept] / np.sqrt(w[kept]))
+        return cls(w[kept], u.T @ r, u.T @ basis)
+
+    def at(self, ratio: Float[np.ndarray, " g"]) -> tuple[np.ndarray, ...]:
+        """ln det of I + ratio K, and what K takes from rᵀr, from Qᵀr and from QᵀQ, (g, …) each."""
+        more = ratio[:, None] * self.power
+        taken = more / (1.0 + more)
+        gram = np.einsum("gm,mi,mj->gij", taken, self.slope, self.slope, optimize=True)
+        return np.log1p(more).sum(axis=1), taken @ self.residual**2, (taken * self.residual) @ self.slope, gram
+
+
+def _likelihood(
+    parts: Sequence[_Part], ratios: Sequence[np.ndarray], r: np.ndarray, basis: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """ℓ and η² at every combination of the parts' ratios τ²/η², (g, …) both."""
+    grid, lead = [part.at(ratio) for part, ratio in zip(parts, ratios, strict=True)], range(len(parts))
+
+    def total(which: int) -> np.ndarray:
+        each = [np.expand_dims(found[which], [j for j in lead if j != b]) for b, found in enumerate(grid)]
+        return sum(each[1:], start=each[0])
+
     rest, k = len(r) - basis.shape[1], basis.shape[1]
-    ur, uq = u.T @ r, u.T @ basis
-    taken = RATIOS[:, None] * w / (1.0 + RATIOS[:, None] * w)
-    gram = np.eye(k) - np.einsum("lm,mi,mj->lij", taken, uq, uq, optimize=True)
-    slope = basis.T @ r - (taken * ur) @ uq
-    square = r @ r - taken @ ur**2 - np.einsum("li,li->l", slope, np.linalg.solve(gram, slope[..., None])[..., 0])
+    gram, slope = np.eye(k) - total(3), basis.T @ r - total(2)
+    square = r @ r - total(1) - np.sum(slope * np.linalg.solve(gram, slope[..., None])[..., 0], axis=-1)
     white = np.maximum(square, 1e-300) / rest
-    logs = -0.5 * (rest * np.log(white) + np.log1p(RATIOS[:, None] * w).sum(axis=1) + np.linalg.slogdet(gram)[1])
-    j = int(np.argmax(logs))
-    bent = logs[j - 1] - 2.0 * logs[j] + logs[j + 1] if 1 < j < len(RATIOS) - 1 else 0.0
-    freedom = -2.0 * bent / np.log(RATIOS[2] / RATIOS[1]) ** 2
-    return Sizes(float(white[j]), float(RATIOS[j] * white[j]), float(logs[j] - logs[0]), float(freedom))
+    return -0.5 * (rest * np.log(white) + total(0) + np.linalg.slogdet(gram)[1]), white

@@ -189,10 +189,12 @@ class Fit:
             return "adequacy unknown: the noise is not known"
         if self.n_values > 1 and np.ptp(self.measurements.value[self.measurements.valid]) == 0:
             return "adequacy unknown: all values are identical"
+        shared = f", but {self.correlation.shared}" if self.correlation.shared else ""
         if ratio < FOLLOWS:
-            return "follows the data within the measurement noise"
+            whole = " on the whole" if shared else ""
+            return f"follows the data within the measurement noise{whole}{shared}"
         if ratio < MISSES:
-            return f"follows the data to about the measurement noise (misfit {ratio:.1f} × noise)"
+            return f"follows the data to about the measurement noise (misfit {ratio:.1f} × noise){shared}"
         return f"inadequate: misses the data by {ratio:.0f} × the measurement noise"
 
     def _rows(self) -> list[tuple[str, str, str]]:

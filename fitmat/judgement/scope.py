@@ -19,14 +19,16 @@ def describe_scope(fit: Fit) -> str:
     about = f"The intervals of {fit.name} are about the incidences measured ({over}); beyond, they extrapolate."
     if found.outcome == "not judged":
         return (
-            f"{about} Whether misfits at neighbouring angles are alike cannot be judged from {count:,} readings: they "
+            f"{about} Whether neighbouring angles share a misfit cannot be judged from {count:,} readings: they "
             "hold only if the model is right."
         )
     if not found.found:
         return about
+    shared = found.shared or "errors of neighbouring angles are alike"
+    shared = shared[0].upper() + shared[1:]
     return (
-        f"{about} Misfits at neighbouring angles are alike: {count:,} readings count as {_counted(found.independent)} "
-        f"independent ones, and the intervals are up to {np.sqrt(found.inflation.max()):.2g} times wider for that."
+        f"{about} {shared}: {count:,} readings count as {_counted(found.independent)} independent ones, and the "
+        f"intervals are up to {np.sqrt(found.inflation.max()):.2g} times wider for that."
     )
 
 

@@ -13,8 +13,9 @@ import fitmat as fm
 from fitmat.fitting import correlation
 from fitmat.fitting.likelihood import prepare
 from fitmat.fitting.losses import LOSSES
-from fitmat.fitting.process import ASKED, LEFT_OVER, factor, find, independent, matern, meat, sizes
+from fitmat.fitting.process import ASKED, LEFT_OVER, counted, factor, find, independent, kernel, matern, meat, sizes
 from fitmat.fitting.result import Fit
+from fitmat.judgement.scope import describe_scope
 from fitmat.maths.directions import from_angles
 from fitmat.measurements.noise import measured_noise
 
@@ -59,10 +60,10 @@ def test_the_factor_is_the_kernel() -> None:
     """Its product and the diagonal left over beside K of every pair; K is singular, for places are repeated."""
     places = np.random.default_rng(0).uniform(0.0, 4.0, (150, 2))
     places = np.concatenate([places, places[:50]])
-    root, left = factor(places, np.ones(len(places), bool))
+    root = factor(places, np.ones(len(places), bool))
     assert root.shape[1] < 150
     gap = dense(places) - root @ root.T
-    np.testing.assert_allclose(np.diagonal(gap), left, atol=1e-9)
+    left = np.diagonal(gap)
     assert np.abs(gap).max() <= left.max() + 1e-9  # what is left is positive semidefinite
     assert left.mean() < LEFT_OVER
 
@@ -81,9 +82,33 @@ def test_sizes_are_those_of_the_error_contrasts() -> None:
 
     best = minimize(cost, np.zeros(2), method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-8})
     white = -cost(np.array([np.log(np.mean((contrasts.T @ r) ** 2)), -40.0]))
-    found = sizes(r, basis, np.linalg.cholesky(kernel))
-    assert found.gain == pytest.approx(-best.fun - white, abs=0.02)  # the grid's ratios are 21 % apart
-    assert [found.white, found.process] == pytest.approx(np.exp(best.x), rel=0.15)
+    found = sizes(r, basis, [np.linalg.cholesky(kernel)])
+    assert found.gain == pytest.approx(-best.fun - white, abs=0.02)  # the grid's ratios are 10 % apart
+    assert [found.white, found.process[0]] == pytest.approx(np.exp(best.x), rel=0.15)
+
+
+def test_each_part_has_a_size_of_its_own() -> None:
+    """Beside the same density, maximised over three sizes; a part whose process hardly raises it has none."""
+    rng = np.random.default_rng(4)
+    places, basis = rng.uniform(0.0, 6.0, (160, 2)), np.linalg.qr(rng.normal(size=(160, 3)))[0]
+    rows = np.stack([places[:, 0] < 3.0, places[:, 0] >= 3.0])
+    kernels = [dense(places) * np.outer(part, part) for part in rows]
+    unit = [np.linalg.cholesky(k + 1e-9 * np.eye(160)) @ rng.normal(size=160) for k in kernels]
+    white, contrasts = rng.normal(size=160), null_space(basis.T)
+    parts = kernel(places, rows)
+
+    def cost(logs: np.ndarray, r: np.ndarray) -> float:
+        spread = np.exp(logs[0]) * np.eye(160) + sum(np.exp(x) * k for x, k in zip(logs[1:], kernels, strict=True))
+        return -multivariate_normal.logpdf(contrasts.T @ r, cov=contrasts.T @ spread @ contrasts)
+
+    r = white + 3.0 * unit[0] + unit[1]
+    best = minimize(cost, np.zeros(3), args=(r,), method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-7})
+    found = sizes(r, basis, parts.roots)
+    assert [found.white, *found.process] == pytest.approx(np.exp(best.x), rel=0.15)
+    assert (found.freedom > 1.0).all()
+    lone = sizes(white + 3.0 * unit[0], basis, parts.roots)
+    assert lone.process[0] > 3.0
+    assert lone.process[1] == 0.0
 
 
 def test_a_right_model_keeps_its_intervals(right: Fit) -> None:
@@ -93,6 +118,27 @@ def test_a_right_model_keeps_its_intervals(right: Fit) -> None:
     assert right.correlation.independent == right.n_values
     draws = fm.laplace(right, seed=1)
     assert draws.values is draws.drawn
+
+
+def test_a_misfit_of_the_highlight_leaves_the_base_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sharp lobe, brighter than its model at some incidences and darker at others; beside it one size for all."""
+    truth, incidences = fm.model("lambert+ggx", kd=0.8, alpha=0.02), np.deg2rad(np.arange(10.0, 51.0, 10.0))
+    out = np.deg2rad(np.arange(-78.0, 79.0))
+    m = fm.simulate(truth, incidences, out, relative_noise=0.01, absolute_noise=1e-4, seed=1)
+    half = m.wi + m.wo
+    near = np.arccos(half[:, 2] / np.linalg.norm(half, axis=1)) < 0.04
+    uneven = 1.0 + 0.1 * near * np.cos(9.0 * m.theta_i)
+    fit = fm.fit(dataclasses.replace(m, value=m.value * uneven[:, None]), "lambert+ggx")
+    found, wider = fit.correlation, np.sqrt(fit.correlation.inflation)
+    assert found.size[0, 0] > 0.0
+    assert found.size[0, 1] == 0.0
+    assert wider[1:].min() > 5.0 * wider[0]
+    assert fit.adequacy.endswith(", but near the highlight neighbouring angles share a misfit")
+    assert ". Near the highlight neighbouring angles share a misfit: " in describe_scope(fit)
+    monkeypatch.setattr(correlation, "NEAR", np.inf)
+    single = dataclasses.replace(fit)
+    assert np.sqrt(single.correlation.inflation[0]) > 2.0 * wider[0]
+    assert single.correlation.shared == "neighbouring angles share a misfit"
 
 
 def test_widened_draws_have_the_covariance_that_is_quoted(wrong: Fit) -> None:
@@ -125,13 +171,13 @@ def test_two_halves_of_a_range_agree() -> None:
 
 @pytest.mark.parametrize("count", [1500, 2000])
 def test_many_rows_are_as_the_exact_kernel_has_them(count: int) -> None:
-    """V of a factor of `RANK` columns beside V of K of every pair."""
+    """Of a factor of `RANK` columns, how alike they are beside tr K² of every pair."""
     rng = np.random.default_rng(2)
     places = np.stack([rng.uniform(-3.0, 3.0, count), np.zeros(count), rng.uniform(0.0, 1.7, count)], axis=1)
-    slopes = np.stack([np.ones(count), np.exp(-(places[:, 0] ** 2)), places[:, 2]], axis=1)
-    root, left = factor(places, np.ones(len(places), bool))
-    found = (root.T @ slopes).T @ (root.T @ slopes) + (slopes.T * left) @ slopes
-    np.testing.assert_allclose(found, slopes.T @ dense(places) @ slopes, rtol=2e-3)
+    every = np.ones(count, bool)
+    found = counted(every[:, None], kernel(places, every[None]))
+    assert found.alike[0, 0] == pytest.approx(np.sum(dense(places) ** 2), rel=2e-3)
+    assert found.part[0, 0] == count
 
 
 def test_a_dense_scan_is_as_wide_as_a_part_of_it(wrong: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -159,20 +205,21 @@ def test_the_channel_that_is_wrong_is_the_one_that_widens() -> None:
     slopes = np.zeros((200, channels, channels + 1))
     slopes[:, :, 0] = np.exp(-(places[:, :1] ** 2))
     slopes[:, np.arange(channels), 1 + np.arange(channels)] = 1.0
-    used, kernel = np.ones(r.shape, bool), factor(places, np.ones(200, bool))
-    found = find(r, slopes, used, kernel[0])
+    used, parts = np.ones(r.shape, bool), kernel(places, np.ones((1, 200), bool))
+    found, counts = find(r, slopes, used, parts), counted(used, parts)
     assert (found.gain[:9] < ASKED).all()
     assert not found.size[:9].any()
-    assert 0.5 < found.size[9] < 2.0
-    between = meat(found, slopes, kernel, 1.0)
+    assert 0.5 < found.size[9, 0] < 2.0
+    between = meat(found, slopes, counts, parts.rows, 1.0)
     own = np.diagonal(between)[1:]
     np.testing.assert_allclose(own[:9], 200.0)  # as independent readings count
-    assert own[9] > 10.0 * 200.0
+    alike = np.sum(dense(places) ** 2) / 200.0
+    assert own[9] == pytest.approx(200.0 * (found.white[9] + alike * found.allowance[9, 0]), rel=1e-3)
     assert between[0, 0] > 1.5 * np.sum(slopes[:, :, 0] ** 2)
     spread = np.diag(np.repeat(found.white, 200))
-    spread[1800:, 1800:] += found.size[9] ** 2 * dense(places)
+    spread[1800:, 1800:] += found.size[9, 0] ** 2 * dense(places)
     exact = np.trace(spread) ** 2 / np.sum(spread**2)
-    assert independent(found, used, kernel[0], 1.0) == pytest.approx(exact, rel=1e-3)
+    assert independent(found, counts, 1.0) == pytest.approx(exact, rel=1e-3)
 
 
 def test_few_values_are_not_judged(wrong: Fit) -> None:

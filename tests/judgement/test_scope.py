@@ -36,9 +36,10 @@ def test_alike_misfits_are_counted(made: fm.Measurements) -> None:
     found = wrong.correlation
     assert 1.0 < found.independent < 324.0
     counted = f"{found.independent:.0f}" if found.independent >= 10 else f"{found.independent:.2g}"
+    shared = found.shared[0].upper() + found.shared[1:]
     wider = f"{np.sqrt(found.inflation.max()):.2g}"
     assert describe_scope(wrong) == (
-        f"{ABOUT} Misfits at neighbouring angles are alike: 324 readings count as {counted} independent ones, and the "
+        f"{ABOUT} {shared}: 324 readings count as {counted} independent ones, and the "
         f"intervals are up to {wider} times wider for that."
     )
 

@@ -147,7 +147,7 @@ def test_evidence_is_the_difference_of_criteria(fits: tuple[Fit, Fit], match: Ma
     assert match.delta_bic == pytest.approx(gain - np.log(51))
     assert match.delta_aicc == pytest.approx(fits[0].aicc - fits[1].aicc)
     low, high = match.hemisphere_distance.ci95
-    assert low < match.hemisphere_distance.value < high
+    assert low <= match.hemisphere_distance.value < high  # the nearest the two can be is one end (`estimate.limits`)
     assert (match.albedo_empirical[0] <= match.albedo_empirical[2]).all()
 
 
