@@ -7,16 +7,16 @@ FIT = (
     "Columns of a table, by name: theta_i, theta_o and phi (or phi_i and phi_o, or a signed theta_o alone) in "
     "degrees; brdf, brdf_cos, reflectance_factor, radiance, or signal and reference; brdf_r, brdf_g, brdf_b or "
     "brdf_550 for channels; sigma where the noise is known.\n\n"
-    "Written to --out: report.html (tables and pictures), fit.json (the same numbers), posterior-MODEL.parquet (draws "
-    "of the parameters). Ctrl-C during sampling keeps what is done and still writes them; a killed run goes on "
-    "when it is given again.\n\n"
+    "Written to --out: report.html (tables and pictures), fit.json (the same numbers), budget.txt (where the "
+    "uncertainty of each comes from), posterior-MODEL.parquet (draws of the parameters). Ctrl-C during sampling keeps "
+    "what is done and still writes them; a killed run goes on when it is given again.\n\n"
     "Examples:\n\n"
     "  fitmat fit measurements.csv\n\n"
     "  fitmat fit measurements.csv --models lambert+ggx --fix ks=1 --out run1\n\n"
     "  fitmat fit gold.csv --models ggx --ior Au --fix ks=1\n\n"
     "  fitmat fit scan.txt --columns theta_i=AOI,brdf=4 --no-mcmc\n\n"
     "  fitmat fit plate_10deg.txt plate_40deg.txt plate_70deg.txt --join\n\n"
-    "  fitmat fit mirror.csv --receiver-angle 0.5 --calibration 0.03"
+    "  fitmat fit mirror.csv --receiver-angle 0.5 --calibration 0.03 --angle-error 0.1"
 )
 
 SIMULATE = (

@@ -25,12 +25,13 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from fitmat.fitting.coordinates import Coordinates
-from fitmat.fitting.likelihood import Data, inferred_noise, misfits
+from fitmat.fitting.likelihood import Data
+from fitmat.fitting.linear import Linear
 from fitmat.fitting.process import ASKED, counted, find, independent, kernel, meat
 from fitmat.maths.directions import zenith
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector
-from fitmat.models.values import values, widths
+from fitmat.models.values import widths
 from fitmat.text import brief
 
 LENGTHS = 1.0, 1.0, 0.8
@@ -44,12 +45,6 @@ NEAR = 3.0
 
 PLACES = "near the highlight", "away from the highlight"
 """The parts of the geometry, in the order of `Correlation.size`."""
-
-ROWS = 4096
-"""Of more rows an evenly spread part stands for all: what the process adds does not shrink with more of them."""
-
-STEP = 1e-3
-"""Of the differences that give the slopes, in standard deviations."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -65,6 +60,7 @@ class Correlation:
         inflation: Of the variance of each fitted parameter, (k,).
         independent: Effective number of independent readings, (tr Σ)²/tr Σ² of Σ = η² I + τ² K over all values.
         outcome: "independent", "correlated", or "not judged".
+        drift: Factor of every variance that alike errors of neighbouring readings make alone.
     """
 
     size: Float[np.ndarray, "c 2"]
@@ -74,6 +70,7 @@ class Correlation:
     inflation: Float[np.ndarray, " k"]
     independent: float
     outcome: str
+    drift: float = 1.0
 
     __repr__ = brief
 
@@ -96,8 +93,8 @@ def correlate(
     best: AbstractBRDF,
     data: Data,
     s: float,
+    linear: Linear | None,
     moved: Coordinates,
-    information: Float[np.ndarray, "p p"],
     count: int,
     rho: float = 0.0,
 ) -> Correlation:
@@ -107,30 +104,21 @@ def correlate(
         best: The model at the optimum.
         data: The samples; of a large file a part.
         s: Discrepancy.
+        linear: Residuals and slopes there; None where there are none.
         moved: The parameters that were fitted.
-        information: Of the natural coordinates of all parameters, all values counted, (p, p).
         count: Values that were fitted, of which `data` may hold a part.
         rho: Correlation of the errors of neighbouring readings, where the data show one: no variance is less than
             (1 + ρ)/(1 − ρ) times H⁻¹, as for the mean of an AR(1), as far as the spread is noise and not misfit.
     """
-    centre, none = np.asarray(vector(best)), _unchanged(data, moved.count, count)
-    if not (data.loss.posterior and np.isfinite(information).all() and np.isfinite(centre).all()):
+    none = _unchanged(data, moved.count, count)
+    if linear is None or not np.isfinite(np.where(linear.used, linear.r, 0.0)).all() or not linear.r[linear.used].any():
         return none
-    inside = np.flatnonzero(moved.side(centre) == 0)
-    if not len(inside):
-        return none
-    known, h = _known(information, moved, inside)
-    data = data.every(-(-len(data.x) // ROWS))
-    r, slopes = _linearised(best, data, s, moved, inside, STEP / np.sqrt(np.diagonal(known)))
-    used = np.asarray(data.weight) > 0
-    if not np.isfinite(np.where(used, r, 0.0)).all() or not r[used].any():
-        return none
-    more, slopes = count / np.count_nonzero(used), np.where(used[:, :, None], slopes, 0.0)
-    places, near = _places(best, data)
+    inside, h, used, slopes = linear.inside, linear.factor, linear.used, linear.slopes
+    places, near = _places(best, linear.data)
     some = np.any(used, axis=1)
     parts = kernel(places, np.stack([some & near, some & ~near]))
-    found, counts = find(r, slopes, used, parts), counted(used, parts)
-    asked, half = found.gain >= ASKED, np.linalg.solve(h, meat(found, slopes, counts, parts.rows, more))
+    found, counts = find(linear.r, slopes, used, parts), counted(used, parts)
+    asked, half = found.gain >= ASKED, np.linalg.solve(h, meat(found, slopes, counts, parts.rows, linear.more))
     ratio, axes = np.linalg.eigh(np.linalg.solve(h, half.T))
     least = 1.0 + 2.0 * rho / (1.0 - rho) / (1.0 + s / float(data.typical)) ** 2
     if least == 1.0 and (not asked.any() or ratio[-1] <= 1.0):
@@ -140,41 +128,14 @@ def correlate(
     wide = np.linalg.solve(h.T, axes * np.sqrt(np.maximum(ratio, least)))
     stretch[np.ix_(inside, inside)] = wide @ axes.T @ h.T
     inflation[inside] = np.sum(wide**2, axis=1) / np.sum(np.linalg.inv(h) ** 2, axis=0)
-    share, alone = float(np.mean(near[some])), min(independent(found, counts, more), count / least)
-    return Correlation(found.size, share, found.gain, stretch, inflation, alone, "correlated")
-
-
-def _known(
-    information: np.ndarray, moved: Coordinates, inside: np.ndarray
-) -> tuple[Float[np.ndarray, "i i"], Float[np.ndarray, "i i"]]:
-    """H of what lies on no bound, the flat prior counted with the variance of its range, and H's Cholesky factor."""
-    span, free = moved.extent[inside], moved.index[inside]
-    known = information[np.ix_(free, free)] + np.diag(12.0 / span**2)
-    unit = np.sqrt(np.abs(np.diagonal(known)))
-    w, v = np.linalg.eigh(known / np.outer(unit, unit))
-    known = (v * np.maximum(w, 1e-12)) @ v.T * np.outer(unit, unit)
-    return known, unit[:, None] * np.linalg.cholesky(known / np.outer(unit, unit))
+    share, alone = float(np.mean(near[some])), min(independent(found, counts, linear.more), count / least)
+    return Correlation(found.size, share, found.gain, stretch, inflation, alone, "correlated", least)
 
 
 def _unchanged(data: Data, parameters: int, count: int) -> Correlation:
     channels = data.x.shape[1]
     parts = np.zeros((channels, 2)), np.nan, np.full(channels, np.nan), np.eye(parameters), np.ones(parameters)
     return Correlation(*parts, float(count), "not judged")
-
-
-def _linearised(
-    best: AbstractBRDF, data: Data, s: float, moved: Coordinates, inside: np.ndarray, step: np.ndarray
-) -> tuple[Float[np.ndarray, "n c"], Float[np.ndarray, "n c i"]]:
-    """Residuals at the optimum and their slopes, −∂r/∂t, along natural coordinates, by central differences."""
-    centre = np.asarray(vector(best))
-    here, moves = moved.natural(centre), np.zeros((len(inside), moved.count))
-    moves[np.arange(len(inside)), inside] = np.minimum(step, 0.01 * moved.span[inside])
-    points = np.clip(np.concatenate([here + moves, here - moves, here[None]]), moved.low, moved.high)
-    x = values(best, moved.filled(centre, points), data.wi, data.wo) * data.kappa
-    noise = np.asarray(inferred_noise(best, data) if data.loss.infers_noise else data.noise)
-    r, k = misfits(x, noise, data, np.asarray(s)), len(inside)
-    apart = points[np.arange(k), inside] - points[np.arange(k, 2 * k), inside]
-    return r[-1], np.moveaxis((r[k : 2 * k] - r[:k]) / apart[:, None, None], 0, -1)
 
 
 def _places(best: AbstractBRDF, data: Data) -> tuple[Float[np.ndarray, "n 3"], Bool[np.ndarray, " n"]]:

@@ -3,7 +3,6 @@
 Gives the best parameters, how sure the data are of them locally (covariance), and what to think of the result.
 """
 
-import dataclasses
 from collections.abc import Mapping
 
 import jax
@@ -12,20 +11,22 @@ from jaxtyping import ArrayLike
 
 from fitmat import arguments
 from fitmat.errors import FitmatError, ModelError
-from fitmat.fitting.coordinates import coordinates
-from fitmat.fitting.likelihood import first_discrepancy, prepare
+from fitmat.fitting.coordinates import Coordinates, coordinates
+from fitmat.fitting.ends import Ends, behind
+from fitmat.fitting.jitter import AGAIN, jittered
+from fitmat.fitting.likelihood import Data, first_discrepancy, prepare
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.losses import loss as find_loss
 from fitmat.fitting.priors import prepare_prior, refuse_idle
-from fitmat.fitting.refining import MAX_STEPS, ROUNDS, STARTS, confirmed
+from fitmat.fitting.refining import MAX_STEPS, ROUNDS, STARTS, confirmed, optima
 from fitmat.fitting.result import Fit, conclude
+from fitmat.fitting.seeing import seen
 from fitmat.fitting.starts import starting_points
 from fitmat.measurements.noise import measured_noise
 from fitmat.measurements.samples import Measurements
-from fitmat.models.around.instrument import Seen
 from fitmat.models.around.noise import LEAST_ABSOLUTE, Noisy
 from fitmat.models.base import AbstractBRDF
-from fitmat.models.parameters import as_parameter, check_range, entries, vector, with_vector
+from fitmat.models.parameters import check_range, entries, vector, with_vector
 from fitmat.models.registry import model
 
 
@@ -74,7 +75,7 @@ def fit(
         )
     template = model(to, channels=channels, masking=masking) if isinstance(to, str) else to
     chosen = find_loss(loss)
-    shown = _seen(template, measurements)
+    shown = seen(template, measurements)
     known = dict(priors or {})
     refuse_idle(known, fixed or {}, chosen)
     if chosen.infers_noise:
@@ -100,26 +101,30 @@ def fit(
     added = np.asarray(vector(shown))[len(vector(template)) :]
     starts = np.column_stack([starts, np.tile(added, (len(starts), 1))])
     ends = confirmed(shown, data, starts, moved, max_steps)
+    if measurements.sigma is not None and not chosen.infers_noise:  # noise that readings show has jitter in it
+        data, ends = _with_jitter(measurements, shown, data, ends, moved, max_steps)
     return conclude(measurements, shown, held, (found_noise, data), ends)
+
+
+def _with_jitter(
+    m: Measurements, shown: AbstractBRDF, data: Data, ends: Ends, moved: Coordinates, max_steps: int
+) -> tuple[Data, Ends]:
+    """The samples with the noise that chance errors of their angles add, and where the ends go with it."""
+    told, found = m.instrument.angle_error, data
+    for _ in range(AGAIN if told else 0):
+        apart = behind(ends, found)
+        order = np.argsort(apart, kind="stable")[:STARTS]
+        if not np.isfinite(apart[order[0]]):
+            break
+        found = jittered(data, with_vector(shown, ends.values[order[0]]), told, signed=bool(m.in_plane.all()))
+        ends = optima(shown, found, ends.values[order], moved, max_steps)
+    return found, ends
 
 
 def _refuse_kinds(measurements: object, to: object, fixed: object, priors: object) -> None:
     arguments.kind("measurements", measurements, Measurements)
     arguments.kind("to", to, str, AbstractBRDF)
     arguments.named(fixed=fixed, priors=priors)
-
-
-def _seen(template: AbstractBRDF, m: Measurements) -> AbstractBRDF:
-    """The model as the measurements' instrument shows it, with what is to be fitted of the instrument at its start."""
-    if m.instrument.ideal:
-        return template
-    dark = np.quantile((m.value * m.wo[:, 2:])[m.valid], 0.01)
-    return Seen(
-        template,
-        dataclasses.replace(m.instrument, calibration=0.0),  # static: each value would be compiled for
-        scale=as_parameter(1.0) if m.instrument.calibration else None,
-        dark=np.clip(0.5 * dark, 1e-6, 0.5) if m.instrument.dark is None else None,
-    )
 
 
 def _noise_priors(m: Measurements) -> dict[str, tuple[ArrayLike, ArrayLike]]:

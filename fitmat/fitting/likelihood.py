@@ -57,6 +57,8 @@ class Data(eqx.Module):
         loss: What a fit minimises.
         level: |f| as the neighbouring angles show it, in sr⁻¹, (n, c), where the noise is inferred; else None.
         typical: The s whose discrepancy equals the noise for the typical sample, in sr^(−1/3).
+        jitter: The part of the noise that chance errors of the angles make, as `noise`; None where nothing is said of
+            them.
     """
 
     wi: Any
@@ -69,6 +71,7 @@ class Data(eqx.Module):
     loss: Loss = eqx.field(static=True, default=DEFAULT)
     level: Any = None
     typical: Any = 0.0
+    jitter: Any = None
 
     def told(self, free: np.ndarray) -> np.ndarray:
         """Which of the free parameters have a prior that is not flat, as `free`."""
@@ -78,8 +81,8 @@ class Data(eqx.Module):
         """Each stride-th row, under the same prior and loss."""
         arrays = (self.wi, self.wo, self.x, self.noise, self.kappa, self.weight)
         wi, wo, x, noise, kappa, weight = (part[::stride] for part in arrays)
-        level = None if self.level is None else self.level[::stride]
-        return Data(wi, wo, x, noise, kappa, weight, self.prior, self.loss, level, self.typical)
+        level, jitter = (None if part is None else part[::stride] for part in (self.level, self.jitter))
+        return Data(wi, wo, x, noise, kappa, weight, self.prior, self.loss, level, self.typical, jitter)
 
     def under(self, loss: Loss) -> "Data":
         """The same samples under another loss and a flat prior."""

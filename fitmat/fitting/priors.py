@@ -3,7 +3,8 @@
 It sees no data. Without a word of the user a parameter is as likely anywhere within its bounds: in the logarithm where
 its scale is log (alpha, exponent, eta, kappa, f0), else linearly; the discrepancy s ≥ 0 likewise. A stated prior is
 a Gaussian in the same coordinate, cut off at the bounds: a log-normal of that median and that relative sd where the
-scale is log. A shared scale g has ln g ~ N(0, calibration²).
+scale is log. What an instrument does not know of itself has the sd that it states: ln g ~ N(0, calibration²) of the
+shared scale, ln w of the half-angles, δ_i and δ_o of the angles' offsets.
 """
 
 from collections.abc import Container, Iterable, Mapping, Sequence
@@ -29,11 +30,11 @@ DISCREPANCY = "discrepancy"
 def prepare_prior(
     model: AbstractBRDF, instrument: Instrument, given: Mapping[str, tuple[ArrayLike, ArrayLike]]
 ) -> Prior | None:
-    """Stated priors, and the calibration's, in natural coordinates; None where everything is flat.
+    """Stated priors, and the instrument's, in natural coordinates; None where everything is flat.
 
     Args:
         model: Gives the parameters.
-        instrument: Gives the prior of the shared scale.
+        instrument: Gives the priors of what it does not know of itself.
         given: Parameter name → centre and sd in physical units, each one number or one per channel.
 
     Raises:
@@ -42,11 +43,11 @@ def prepare_prior(
     every, places = coordinates(model), {e.name: e for e in entries(model)}
     mean, precision = np.zeros(len(vector(model))), np.zeros(len(vector(model)))
     discrepancy = 0.0
-    if instrument.calibration and "scale" in given:
-        got = f"prior of scale beside the instrument's calibration = {instrument.calibration:g}"
-        raise ModelError(f"{got}, expected one of the two. Leave one out.")
-    if instrument.calibration:
-        precision[places["scale"].place] = 1.0 / instrument.calibration
+    for name, (field, sd) in told_of(instrument).items():
+        if name in given:
+            got = f"prior of {name} beside the instrument's {field} = {getattr(instrument, field):g}"
+            raise ModelError(f"{got}, expected one of the two. Leave one out.")
+        precision[places[name].place] = 1.0 / sd
     for name, pair in given.items():
         centre, sd = _pair(name, pair)
         if name == DISCREPANCY:
@@ -63,6 +64,18 @@ def prepare_prior(
     if not precision.any() and not discrepancy:
         return None
     return Prior(mean, precision, np.asarray(discrepancy))
+
+
+def told_of(instrument: Instrument) -> dict[str, tuple[str, float]]:
+    """Parameter of `models.around.instrument.Seen` → which field tells of it, and its sd in natural coordinates."""
+    degrees = float(np.rad2deg(instrument.angle_error))
+    known = {
+        "scale": ("calibration", instrument.calibration),
+        "aperture": ("aperture_error", instrument.aperture_error),
+        "theta_i_offset": ("angle_error", degrees),
+        "theta_o_offset": ("angle_error", degrees),
+    }
+    return {name: told for name, told in known.items() if told[1]}
 
 
 def refuse_idle(given: Container[str], fixed: Iterable[str], loss: Loss) -> None:

@@ -15,6 +15,7 @@ from fitmat.fitting.correlation import Correlation, correlate
 from fitmat.fitting.ends import AGREE, AS_GOOD, Ends, behind, home
 from fitmat.fitting.information import FOLLOWS, MISSES, covariance, information, inverse_information
 from fitmat.fitting.likelihood import Data, best_discrepancy, first_discrepancy
+from fitmat.fitting.linear import Linear, linearise
 from fitmat.fitting.losses import DEFAULT, Loss
 from fitmat.fitting.symmetries import nearest
 from fitmat.maths.normal import Z95
@@ -109,9 +110,14 @@ class Fit:
         return self.coordinates.index
 
     @functools.cached_property
+    def linear(self) -> Linear | None:
+        """Residuals and slopes at the optimum; None where there are none."""
+        return linearise(self.model, self.data, self.discrepancy, self.coordinates, self.information, self.n_values)
+
+    @functools.cached_property
     def correlation(self) -> Correlation:
         """How alike the misfits of neighbouring geometries are, and what follows for everything that is quoted."""
-        known = self.model, self.data, self.discrepancy, self.coordinates, self.information, self.n_values
+        known = self.model, self.data, self.discrepancy, self.linear, self.coordinates, self.n_values
         return correlate(*known, self.noise.rho)
 
     @functools.cached_property

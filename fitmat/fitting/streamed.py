@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import ArrayLike
 
 from fitmat._types import Progress
+from fitmat.errors import ModelError
 from fitmat.fitting import fitting
 from fitmat.fitting.information import FOLLOWS, covariance, is_positive
 from fitmat.fitting.likelihood import Data
@@ -147,6 +148,11 @@ def fit_part(
 ) -> Fit:
     """The fit of the part, with the noise that all rows show; as `fit_chunks`."""
     part = every.chunks.part
+    if part.instrument.angle_error:
+        got = (
+            f"angle_error = {np.rad2deg(part.instrument.angle_error):g}° (--angle-error) on {every.chunks.n_samples:,}"
+        )
+        raise ModelError(f"{got} rows, expected few enough to be fitted at once. Leave it out, or take fewer rows.")
     noise = every.known.of_part(part)
     start = fitting.fit(dataclasses.replace(part, sigma=noise.sigma), to, fixed=fixed, priors=priors, masking=masking)
     return dataclasses.replace(start, measurements=part, noise=noise)

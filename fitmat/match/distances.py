@@ -38,6 +38,7 @@ class Distances:
     Attributes:
         theta_i: Incidence of the curves, radians, (k,).
         whole: Metric → distance over all pairs of directions.
+        relative: The relative distance over all pairs at each draw, best first, (1 + draws,).
         measured: The relative distance over the incidence angles of the measurements.
         beyond: Fraction of the whole relative difference T that lies at incidences smaller or larger than all of these.
         by_region: Metric → region → distance over the region's pairs; for "albedo" the region's part of the whole.
@@ -50,6 +51,7 @@ class Distances:
 
     theta_i: Float[np.ndarray, " k"]
     whole: dict[str, Estimate]
+    relative: Float[np.ndarray, " d"]
     measured: Estimate
     beyond: float
     by_region: dict[str, dict[str, Estimate]]
@@ -86,11 +88,13 @@ def measure_distances(
     best = _integrals(_first(pair), nodes, of_lobe, (ZENITH_NODES, AZIMUTH_NODES))
     top, bottom, albedos = _spread_about(best, _integrals(pair, nodes, of_lobe, COARSE))
     result: dict[str, dict] = {key: {} for key in ("whole", "by_region", "share", "by_incidence", "both")}
+    wholes = {}
     for k, (name, metric) in enumerate(METRICS.items()):
         t, b = (part[:, over, k] * incidence_weight(metric, theta, solid)[:, None] for part in (top, bottom))
         t, b = t.sum(axis=1), b.sum(axis=1)
         spread, shares = _over_nodes(metric, t, b), t / np.maximum(t.sum(axis=1, keepdims=True), 1e-300)
-        result["whole"][name] = estimate(_over_nodes(metric, t.sum(axis=1), b.sum(axis=1)))
+        wholes[name] = _over_nodes(metric, t.sum(axis=1), b.sum(axis=1))
+        result["whole"][name] = estimate(wholes[name])
         result["by_region"][name] = {region: estimate(spread[:, r]) for r, region in enumerate(REGIONS)}
         result["share"][name] = {region: estimate(shares[:, r]) for r, region in enumerate(REGIONS)}
         t, b = top[:, curves, k], bottom[:, curves, k]
@@ -102,6 +106,7 @@ def measure_distances(
     return Distances(
         theta_i=ANGLES,
         whole=result["whole"],
+        relative=wholes["relative"],
         measured=estimate(_over_nodes(METRICS["relative"], t, b)),
         beyond=_beyond(top[0, over, place].sum(axis=1) * solid * np.cos(theta), theta, measured),
         by_region=result["by_region"],

@@ -195,7 +195,7 @@ def compare(
     empirical, microfacet = (one, other) if is_empirical(one.fit.name) else (other, one)
     _refuse_unlike(empirical, microfacet)
     fits, models = (empirical.fit, microfacet.fit), (empirical.fit.model, microfacet.fit.model)
-    draws, m = _paired(empirical, microfacet), fits[0].measurements
+    draws, m = paired_draws(empirical, microfacet), fits[0].measurements
     every = incidences(m.wi, np.any(m.valid, axis=1), MOST_INCIDENCES)
     measured = np.deg2rad([group.theta_i_deg for group in every])
     few = draws[0][: FEW_DRAWS + 1], draws[1][: FEW_DRAWS + 1]
@@ -264,7 +264,7 @@ def _perceived(empirical: Fit, microfacet: Fit, draws: PairedDraws, pictures: bo
     return perceived(empirical.model, microfacet.model, draws, empirical.measurements.channels, pictures=pictures)
 
 
-def _paired(empirical: Posterior, microfacet: Posterior) -> PairedDraws:
+def paired_draws(empirical: Posterior, microfacet: Posterior) -> PairedDraws:
     """Parameter vectors of both: the best fits, then draws in pairs, in no particular order."""
     one, other = _by_scale(empirical), _by_scale(microfacet)
     mixed = np.random.default_rng(0).permutation(min(len(one), len(other)))

@@ -109,6 +109,42 @@ def rotated(w: Float[Any, "3"], angle: Float[Any, ""]) -> Float[Any, "3"]:
     return xp.stack([cos * w[0] - sin * w[1], sin * w[0] + cos * w[1], w[2]])
 
 
+def forward(wi: Float[Any, "*n 3"], wo: Float[Any, "*n 3"]) -> Float[Any, "*n 3"]:
+    """The horizontal unit vector towards the mirror side, away from the light, of one pair or of many.
+
+    For light along the normal, towards +x or −x (else ±y) as `from_angles` has azimuth π for the mirror side: along the
+    sensor's own azimuth where it has one.
+    """
+    xp = library(wi, wo)
+    light, sensor = (w * np.array([1.0, 1.0, 0.0]) for w in (wi, wo))
+    side = sensor[..., :1] + 1e-3 * sensor[..., 1:2]
+    along = xp.where(side > 0.0, -1.0, 1.0) * sensor
+    fallback = xp.where(_length(sensor) > _LEAST, along, np.array([-1.0, 0.0, 0.0]))
+    chosen = xp.where(_length(light) > _LEAST, -light, fallback)
+    return chosen / _length(chosen)
+
+
+def turned(w: Float[Any, "*n 3"], towards: Float[Any, "*n 3"], angle: Any) -> Float[Any, "*n 3"]:
+    """Directions turned by `angle` (radians) from the normal towards a horizontal unit vector: Rodrigues' rotation.
+
+    A direction in the plane of the two changes its zenith angle by it.
+    """
+    xp = library(w, towards, angle)
+    up = np.array([0.0, 0.0, 1.0])
+    axis = xp.stack([-towards[..., 1], towards[..., 0], 0.0 * towards[..., 0]], axis=-1)
+    across = xp.sum(axis * w, axis=-1, keepdims=True) * axis
+    tangent = towards * w[..., 2:] - up * xp.sum(towards * w, axis=-1, keepdims=True)
+    return w * xp.cos(angle) + tangent * xp.sin(angle) + across * (1.0 - xp.cos(angle))
+
+
+def _length(w: Any) -> Any:
+    return library(w).linalg.norm(w, axis=-1, keepdims=True)
+
+
+_LEAST = 1e-9
+# Sine of the zenith angle below which a direction is the normal.
+
+
 def mirror(directions: Float[Any, "*n 3"]) -> Float[Any, "*n 3"]:
     """The mirror directions 2(n·ω)n − ω, of one direction or of many."""
     return directions * np.array([-1.0, -1.0, 1.0])

@@ -44,6 +44,13 @@ class StatedAlbedo(NamedTuple):
     value: float
 
 
+def in_plane(wi: Float[np.ndarray, "n 3"], wo: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, " n"]:
+    """Which pairs of directions lie in the plane of incidence (all do where ω_i or ω_o is the normal)."""
+    phi = relative_azimuth(wi, wo)
+    aside = np.minimum(phi, np.pi - phi)
+    return (aside < IN_PLANE) | (zenith(wi) < IN_PLANE) | (zenith(wo) < IN_PLANE)
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Measurements:
     """n samples of a BRDF in c channels.
@@ -149,9 +156,7 @@ class Measurements:
     @property
     def in_plane(self) -> Bool[np.ndarray, " n"]:
         """Which rows lie in the plane of incidence (all azimuths do where ω_i or ω_o is the normal)."""
-        phi = self.phi
-        aside = np.minimum(phi, np.pi - phi)
-        return (aside < IN_PLANE) | (self.theta_i < IN_PLANE) | (self.theta_o < IN_PLANE)
+        return in_plane(self.wi, self.wo)
 
     def rows(self, keep: np.ndarray) -> "Measurements":
         """The rows selected by a mask or by indices; counts of what was masked stay those of the source."""

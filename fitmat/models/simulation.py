@@ -13,8 +13,8 @@ from fitmat import arguments
 from fitmat.errors import FitmatError, ModelError
 from fitmat.maths.directions import from_angles
 from fitmat.measurements.instrument import IDEAL, Instrument
-from fitmat.measurements.samples import Measurements, from_arrays
-from fitmat.models.around.instrument import Seen
+from fitmat.measurements.samples import Measurements, from_arrays, in_plane
+from fitmat.models.around.instrument import Seen, displaced
 from fitmat.models.base import AbstractBRDF, AbstractEstimated, evaluate, refuse_sampling
 from fitmat.models.parameters import vector
 
@@ -50,8 +50,9 @@ def simulate(
         phi_i: Azimuths of incidence, (d,) or one; of consequence for anisotropic and tilted samples only.
         channels: Names of the c channels.
         give_sigma: Whether the measurements know their σ; never where there is no noise.
-        instrument: What shows the surface. Its calibration error is drawn once, from
-            ln g ~ N(0, calibration²); its dark signal must have a value.
+        instrument: What shows the surface. Its calibration error is drawn once, from ln g ~ N(0, calibration²), that of
+            its half-angles likewise; of each angle an offset once, and jitter for every reading, both from
+            N(0, angle_error²). Its dark signal must have a value.
         samples: Paths for each geometry of a model that is estimated, such as `ggx-walk`; for no other. Its standard
             error is part of σ.
 
@@ -84,9 +85,10 @@ def simulate(
     _refuse_single_precision(truth)
     wi, wo = from_angles(light, turn), from_angles(np.abs(sensor), turn + relative + np.where(sensor < 0, np.pi, 0.0))
     rng = np.random.default_rng(seed)
-    scale = jnp.exp(instrument.calibration * rng.normal()) if instrument.calibration else None
-    shown = truth if instrument.ideal else Seen(truth, instrument, scale=scale)
-    exact, error = _values(shown, (wi, wo), samples, seed)
+    shown = truth if instrument.ideal else _shown(truth, instrument, rng)
+    pair, ratio = _read_amiss(wi, wo, instrument, rng) if instrument.angle_error else ((wi, wo), 1.0)
+    exact, error = _values(shown, pair, samples, seed)
+    exact = exact * ratio
     if channels is not None and len(channels) != exact.shape[1]:
         raise ModelError(f"{len(channels)} channel names, expected {exact.shape[1]}, one for each of the model's.")
     sigma = np.hypot(absolute_noise, relative_noise * exact)
@@ -98,6 +100,24 @@ def simulate(
         light, sensor, value, phi=relative, phi_i=turn, sigma=given, channels=channels, source=source
     )
     return dataclasses.replace(measured, instrument=instrument)
+
+
+def _shown(truth: AbstractBRDF, instrument: Instrument, rng: np.random.Generator) -> Seen:
+    """The surface as an instrument shows it whose factors are drawn."""
+    scale, aperture = (
+        jnp.exp(sd * rng.normal()) if sd else None for sd in (instrument.calibration, instrument.aperture_error)
+    )
+    return Seen(truth, instrument, scale=scale, aperture=aperture)
+
+
+def _read_amiss(
+    wi: np.ndarray, wo: np.ndarray, instrument: Instrument, rng: np.random.Generator
+) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
+    """Where the light and the sensor are in truth, and the light's cosine there over that where it was read."""
+    sd, count = instrument.angle_error, len(wi)
+    light, sensor = (sd * (rng.normal() + rng.normal(size=(count, 1))) for _ in range(2))
+    true = displaced(wi, wo, light, sensor, signed=bool(in_plane(wi, wo).all()))
+    return true, np.maximum(true[0][:, 2:], 0.0) / wi[:, 2:]
 
 
 def _values(

@@ -23,6 +23,7 @@ from markupsafe import Markup
 from fitmat import arguments, files
 from fitmat.errors import OutputError
 from fitmat.fitting.result import RESULTS, Fit
+from fitmat.judgement import budget
 from fitmat.judgement.choice import Choice
 from fitmat.match.ablation import EXPLAINS, TERMS
 from fitmat.match.appearance.colour import WHITE_LUMINANCE
@@ -49,17 +50,19 @@ Draw = Callable[[], "Figure"]
 
 DPI = 96
 CHANNELS_DRAWN = 3
-PAGE = "report.html"
+PAGE, BUDGET = "report.html", "budget.txt"
 
 
 def write(folder: Path, study: Study) -> str:
-    """Write `fit.json`, one `posterior-MODEL.parquet` per model, and then `report.html` into an existing folder.
+    """Write `fit.json`, `budget.txt`, one `posterior-MODEL.parquet` per model, then `report.html` into a folder.
 
     Returns:
         What is missing because it could not be drawn or written, in one sentence; "" where nothing is.
     """
     found = record.to_dict(study)
     (folder / RECORD).write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    budgets = [str(found.budget) for found in study.findings if found.budget is not None]
+    (folder / BUDGET).write_text("\n\n\n".join(budgets) + "\n", encoding="utf-8")
     for posterior in study.posteriors:
         posterior.save(folder / POSTERIOR.format(posterior.fit.name))
     pictures = _Pictures()
@@ -80,12 +83,12 @@ def own(folder: Path) -> list[str]:
         found = json.loads((folder / RECORD).read_text(encoding="utf-8"))
         models = [str(fit["model"]) for fit in found["fits"] if found["fitmat"]]
     except (OSError, ValueError, LookupError, TypeError):
-        for name in (PAGE, RECORD):
+        for name in (PAGE, RECORD, BUDGET):
             if os.path.lexists(folder / name):
                 why = f"{folder / name} is not known to be of an earlier run, and is not replaced"
                 raise OutputError(f"{why}; move it, or give another --out DIR.") from None
         return []
-    names = [*(POSTERIOR.format(model) for model in models), PAGE, RECORD]
+    names = [*(POSTERIOR.format(model) for model in models), PAGE, BUDGET, RECORD]
     return [name for name in names if Path(name).name == name and os.path.lexists(folder / name)]
 
 
@@ -159,6 +162,8 @@ def _rendered(study: Study, pictures: "_Pictures") -> str:
         **_match_parts(study.match, study.full),
         **_choice_parts(study.choice, study.full),
         identified=[found.identifiability for found in findings if found.identifiability is not None],
+        distance=study.distance,
+        of=budget,
         checks=[found.check for found in findings if found.check is not None],
         opinions=[found.second_opinion for found in findings if found.second_opinion is not None],
     )

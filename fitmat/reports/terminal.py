@@ -69,8 +69,8 @@ def _remark(out: Console, found: Findings) -> None:
         _say(out, ("in doubt" if against.inadequate else "note", "yellow"), f": {against}")
     for words in filter(None, (found.scope, found.several_facets)):
         _say(out, words)
-    for said in (found.identifiability, found.second_opinion):
-        if said is not None:
+    for said in (found.identifiability, found.second_opinion, found.budget):
+        if said is not None and said.words:
             _say(out, said.words)
 
 

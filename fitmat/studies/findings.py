@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from fitmat.fitting import priors
 from fitmat.fitting.result import Fit
+from fitmat.judgement.budget import Budget, draw_up
 from fitmat.judgement.doubts import Doubts, find_doubts
 from fitmat.judgement.fit_metrics import fit_metrics
 from fitmat.judgement.identifiability.verdicts import Identifiability
@@ -59,6 +60,7 @@ class Findings:
         learnt: What the data added, for each fitted parameter.
         curves: Along each section of the study.
         residuals: Of each value, in standard deviations of noise and misfit, rows as in `fit.data`, (n, c).
+        budget: Where its uncertainty comes from; None where there is nothing to propagate, as under an objective.
         identifiability: What the angles determine; None where the model was not examined one by one.
         check: Whether the model can make such data; None where that was not asked.
         second_opinion: Of another sampler; None where that was not asked.
@@ -75,6 +77,7 @@ class Findings:
     learnt: tuple[Learnt, ...]
     curves: tuple[Curve, ...]
     residuals: Float[np.ndarray, "n c"]
+    budget: Budget | None = None
     identifiability: Identifiability | None = None
     check: PredictiveCheck | None = None
     second_opinion: SecondOpinion | None = None
@@ -108,10 +111,11 @@ def find(
     """
     fit = posterior.fit
     fitted = parameters(posterior, () if identifiability is None else identifiability.undetermined)
+    follows = derived(posterior, fitted)
     return Findings(
         posterior=posterior,
         parameters=tuple(fitted),
-        derived=tuple(derived(posterior, fitted)),
+        derived=tuple(follows),
         doubts=find_doubts(fit),
         scope=describe_scope(fit),
         several_facets=left_out(fit),
@@ -120,6 +124,7 @@ def find(
         learnt=_learnt(posterior),
         curves=predict_curves(posterior, along),
         residuals=standardised_residuals(fit),
+        budget=draw_up(posterior, fitted, follows),
         identifiability=identifiability,
         check=check,
     )

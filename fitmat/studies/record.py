@@ -7,6 +7,7 @@ from importlib.metadata import version
 from typing import Any
 
 from fitmat.fitting.result import RESULTS
+from fitmat.judgement.budget import ALBEDO_DEG, COVERAGE, SOURCES, Budget, Line
 from fitmat.judgement.choice import Choice
 from fitmat.judgement.identifiability.verdicts import Identifiability
 from fitmat.match.appearance.spheres import Perceived, Spread
@@ -37,7 +38,7 @@ def to_dict(study: Study) -> dict[str, Any]:
             "channels": list(m.channels),
             "fits": [_fit_dict(found) for found in study.findings],
             "choice": None if study.choice is None else _choice_dict(study.choice),
-            "match": None if study.match is None else _match_dict(study.match),
+            "match": None if study.match is None else _match_dict(study.match, study.distance),
         }
     )
 
@@ -68,6 +69,7 @@ def _fit_dict(found: Findings) -> dict[str, Any]:
         "steps": fit.steps,
         "parameters": {q.name: _quantity_dict(q, channels) for q in found.parameters},
         "derived": {q.name: _quantity_dict(q, channels) for q in found.derived},
+        "budget": None if found.budget is None else _budget_dict(found.budget),
         "identifiability": None if found.identifiability is None else _identified_dict(found.identifiability),
         "priors": dict(found.priors),
         "posterior": {
@@ -117,7 +119,30 @@ def _quantity_dict(q: Quantity, channels: int) -> dict[str, Any]:
     return {"value": value, "sd": sd, "ci95": ci95, "unit": q.unit, "symbol": q.symbol, "remark": remark}
 
 
-def _match_dict(match: Match) -> dict[str, Any]:
+def _budget_dict(found: Budget) -> dict[str, Any]:
+    return {
+        "words": found.words,
+        "coverage_factor": COVERAGE,
+        "sources": SOURCES,
+        "albedo_theta_i_deg": ALBEDO_DEG,
+        "unstated": found.unstated,
+        "quantities": {line.name: _line_dict(line) for line in found.lines},
+        "correlation": found.correlation,
+    }
+
+
+def _line_dict(line: Line) -> dict[str, Any]:
+    return {
+        "value": line.value,
+        "unit": line.unit,
+        "remark": line.remark,
+        "parts": line.parts,
+        "u": line.combined,
+        "U": line.expanded,
+    }
+
+
+def _match_dict(match: Match, distance: Line | None) -> dict[str, Any]:
     def estimate(e: Estimate | None) -> dict[str, Any] | None:
         return None if e is None else {"value": e.value, "ci95": list(e.ci95) if e.has_interval else None}
 
@@ -147,6 +172,7 @@ def _match_dict(match: Match) -> dict[str, Any]:
             }
             for name, whole in match.distances.whole.items()
         },
+        "budget": None if distance is None else _line_dict(distance),
         "cannot_be_told_apart_up_to_deg": match.telling.alike_up_to_deg,
         "imitations": [
             {"of": i.of, "by": i.model.name, "metric": i.metric, "parameters": i.parameters, "distance": i.distance}

@@ -17,12 +17,13 @@ from fitmat._types import Progress
 from fitmat.errors import ModelError
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.streamed import fit_from, fit_part, rows
+from fitmat.judgement.budget import Line, of_draws
 from fitmat.judgement.choice import Choice, choose
 from fitmat.judgement.examination.examining import warnings
 from fitmat.judgement.identifiability.verdicts import Identifiability, identify
 from fitmat.judgement.prediction import sections
 from fitmat.judgement.predictive_check import PredictiveCheck, check_predictions
-from fitmat.match.match import Match, compare, is_empirical, is_microfacet
+from fitmat.match.match import Match, compare, is_empirical, is_microfacet, paired_draws
 from fitmat.measurements.large.stream import Stream, hold
 from fitmat.measurements.samples import Measurements
 from fitmat.models.around.tilt import Tilted
@@ -52,6 +53,7 @@ class Study:
         findings: One for each model, in the order of the fits.
         match: Of an empirical and a microfacet model among them; None where there is no such pair.
         choice: Which model the data prefer; None under a loss that weighs no models, and of a single model.
+        distance: Where the uncertainty of the match's distance comes from; None where there is no match or no budget.
         full: Whether everything was asked; see `study`.
         warnings: What is odd about the measurements themselves, as sentences.
         rows: How many rows were given, and in how many of them something is masked, where `measurements` holds only
@@ -61,6 +63,7 @@ class Study:
     findings: tuple[Findings, ...]
     match: Match | None = None
     choice: Choice | None = None
+    distance: Line | None = None
     full: bool = False
     warnings: tuple[str, ...] = ()
     rows: tuple[int, int] | None = None
@@ -251,7 +254,17 @@ def judge(
     if second_opinion:
         asked = [found.posterior in looked_at and found.posterior.chain is not None for found in findings]
         findings = [_asked_again(f, seed, say) if again else f for f, again in zip(findings, asked, strict=True)]
-    return Study(tuple(findings), match, choice, full, odd.result())
+    return Study(tuple(findings), match, choice, _distance(match), full, odd.result())
+
+
+def _distance(match: Match | None) -> Line | None:
+    """The budget of the distance over all pairs of directions."""
+    if match is None:
+        return None
+    pairs = zip(
+        (match.empirical.fit, match.microfacet.fit), paired_draws(match.empirical, match.microfacet), strict=True
+    )
+    return of_draws("hemisphere distance", "d", match.distances.relative, list(pairs))
 
 
 def _odd(posteriors: Sequence[Posterior]) -> tuple[str, ...]:

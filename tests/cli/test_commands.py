@@ -297,7 +297,7 @@ def test_out_is_refused_then_replaced_by_force(run, tmp_path):
     out = tmp_path / "out"
     assert run("fit", DATA / "sparse.csv", *QUICK, "--out", out).code == 0
     before = {path.name: path.read_bytes() for path in out.iterdir()}
-    assert sorted(before) == ["fit.json", "posterior-lambert.parquet", "report.html"]
+    assert sorted(before) == ["budget.txt", "fit.json", "posterior-lambert.parquet", "report.html"]
     assert_refused(
         run("fit", DATA / "noisy.csv", *QUICK, "--out", out), "already exists; give another --out DIR, or --f"
     )
@@ -306,7 +306,7 @@ def test_out_is_refused_then_replaced_by_force(run, tmp_path):
     other = ("--models", "lambert+phong", "--fix", "exponent=20", "--fix", "ks=0.1", "--no-mcmc")
     assert run("fit", DATA / "sparse.csv", *other, "--out", out, "--force").code in (0, 3)
     names = sorted(path.name for path in out.iterdir())
-    assert names == ["fit.json", "notes.txt", "posterior-lambert+phong.parquet", "report.html"]
+    assert names == ["budget.txt", "fit.json", "notes.txt", "posterior-lambert+phong.parquet", "report.html"]
 
 
 @pytest.mark.study
@@ -447,6 +447,7 @@ def test_default_run_prints_one_object_and_nothing_else(environment, tmp_path):
     assert [f["model"] for f in found["fits"]] == ["lambert+blinn-phong", "lambert+ggx"]
     assert all(f["posterior"]["verdict"] in ("reliable", "tentative") for f in found["fits"])
     assert sorted(os.listdir(tmp_path / "sparse-fitmat")) == [
+        "budget.txt",
         "fit.json",
         "posterior-lambert+blinn-phong.parquet",
         "posterior-lambert+ggx.parquet",

@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 from scipy.stats import multivariate_normal
 
 import fitmat as fm
-from fitmat.fitting import correlation
+from fitmat.fitting import correlation, linear
 from fitmat.fitting.likelihood import prepare
 from fitmat.fitting.losses import LOSSES
 from fitmat.fitting.process import ASKED, LEFT_OVER, counted, factor, find, independent, kernel, matern, meat, sizes
@@ -187,9 +187,12 @@ def test_a_dense_scan_is_as_wide_as_a_part_of_it(wrong: Fit, monkeypatch: pytest
     more = m.n_samples / wrong.n_values
 
     def inflation(rows: int) -> np.ndarray:
-        monkeypatch.setattr(correlation, "ROWS", rows)
+        monkeypatch.setattr(linear, "ROWS", rows)
         given = wrong.model, data, wrong.discrepancy, wrong.coordinates, more * wrong.information, m.n_samples
-        return correlation.correlate(*given).inflation
+        near = linear.linearise(*given)
+        return correlation.correlate(
+            wrong.model, data, wrong.discrepancy, near, wrong.coordinates, m.n_samples
+        ).inflation
 
     every = inflation(10_000)
     assert every.max() > 100.0

@@ -201,11 +201,20 @@ def test_report_makes_every_file(studied, tmp_path):
     with pytest.raises(OutputError, match="already exists"):
         fitmat.report(studied, tmp_path / "run")
     tmp_path = tmp_path / "run"
-    names = ["fit.json", *(f"posterior-{name}.parquet" for name in NAMES), "report.html"]
+    names = ["budget.txt", "fit.json", *(f"posterior-{name}.parquet" for name in NAMES), "report.html"]
     assert sorted(path.name for path in tmp_path.iterdir()) == names
-    draws, posterior = pl.read_parquet(tmp_path / names[2]), studied.posteriors[1]
+    draws, posterior = pl.read_parquet(tmp_path / names[3]), studied.posteriors[1]
     assert draws.columns[:4] == ["chain", "draw", "kd r", "kd g"]
     np.testing.assert_array_equal(draws["alpha"].to_numpy(), posterior.values[:, -2])
+    texts, words = (tmp_path / "budget.txt").read_text(encoding="utf-8"), (tmp_path / "report.html").read_text()
+    for fit in json.loads((tmp_path / "fit.json").read_text())["fits"]:
+        told = fit["budget"]
+        assert f"Uncertainty budget of {fit['model']}\n" in texts
+        assert told["words"] in words
+        for line in told["quantities"].values():
+            if line["parts"]:
+                assert sum(u**2 for u in line["parts"].values()) == pytest.approx(line["u"] ** 2)
+                assert line["U"] == pytest.approx(2.0 * line["u"])
     said = studied.findings[1].several_facets
     assert said.startswith("ggx counts light that meets one facet")
     assert said in (tmp_path / "report.html").read_text(encoding="utf-8")

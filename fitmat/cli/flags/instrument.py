@@ -47,6 +47,31 @@ ReceiverAngleFlag = Annotated[
     ),
 ]
 
+ApertureErrorFlag = Annotated[
+    float,
+    typer.Option(
+        min=0,
+        max=0.5,
+        help="Relative standard uncertainty of these half-angles, such as 0.05.",
+        metavar="X",
+        show_default=False,
+        rich_help_panel=INSTRUMENT,
+    ),
+]
+
+AngleErrorFlag = Annotated[
+    float,
+    typer.Option(
+        min=0,
+        max=2,
+        help="Standard uncertainty of theta_i and theta_o in degrees: of an offset that all rows share, which is "
+        "fitted, and of what each row adds to it by chance.",
+        metavar="DEG",
+        show_default=False,
+        rich_help_panel=INSTRUMENT,
+    ),
+]
+
 DarkFlag = Annotated[
     str,
     typer.Option(
@@ -62,6 +87,8 @@ def instrument(
     calibration: CalibrationFlag = 0.0,
     source_angle: SourceAngleFlag = 0.0,
     receiver_angle: ReceiverAngleFlag = 0.0,
+    aperture_error: ApertureErrorFlag = 0.0,
+    angle_error: AngleErrorFlag = 0.0,
     dark: DarkFlag = "0",
 ) -> Any:
     """The `fitmat.measurements.instrument.Instrument` that the flags describe.
@@ -75,4 +102,5 @@ def instrument(
         level = None if dark == "fit" else float(dark)
     except ValueError:
         raise ReadError(f"--dark {dark}: expected a number in sr⁻¹, or fit.") from None
-    return Instrument(radians(source_angle), radians(receiver_angle), calibration, level)
+    half_angles = radians(source_angle), radians(receiver_angle)
+    return Instrument(*half_angles, calibration, level, radians(angle_error), aperture_error)

@@ -1,9 +1,10 @@
-"""Seen: a surface as an instrument shows it, with finite apertures, a shared scale error and a dark signal.
+"""Seen: a surface as an instrument shows it: finite apertures, a shared scale error, offsets of angles, a dark signal.
 
 It holds no surface of its own, and no noise.
 """
 
 import functools
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -12,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat._types import Scalar, Spectrum, Vec3
-from fitmat.maths.directions import COS_MIN, above
+from fitmat.maths.directions import COS_MIN, above, forward, turned
 from fitmat.measurements.instrument import Instrument
 from fitmat.models.around.shown import AbstractShown
 from fitmat.models.base import AbstractBRDF
@@ -24,20 +25,33 @@ RINGS, SPOKES = 5, 11
 _DENSE = 200
 
 
-class Seen(AbstractShown):
-    r"""What an instrument reads of a base: its apertures, its calibration and its dark signal.
+def _offset(symbol: str, of: str) -> Any:
+    return param(
+        -10.0, 10.0, symbol=symbol, unit="°", optional=True, starts=(0.0,),
+        doc=f"what is to be added to every {of} that was read; 0 where its scale is right",
+    )  # fmt: skip
 
-    .. math:: f = g \left( \frac{\sum_k w_k f_b(\omega_{i,k}, \omega_{o,k}) c_{i,k} c_{o,k}}
-        {\sum_k w_k c_{i,k} c_{o,k}} + \frac{b}{c_o} \right)
+
+class Seen(AbstractShown):
+    r"""What an instrument reads of a base: its apertures, its calibration, its angles' offsets and its dark signal.
+
+    .. math:: f = g \left( \frac{c_i(\theta_i + \delta_i)}{c_i(\theta_i)} \frac{\sum_k w_k
+        f_b(\omega_{i,k}, \omega_{o,k}) c_{i,k} c_{o,k}} {\sum_k w_k c_{i,k} c_{o,k}} + \frac{b}{c_o} \right)
 
     The sum is the average of the BRDF over the two projected solid angles (Nicodemus et al. 1977, eq. 12), by a fixed
     rule of 55 nodes (`cone_rule`): a fit costs about 55 times as much as one with an ideal instrument. With apertures
     of half-angle A and B a lobe of slope α is exact to 0.2 % while A + B ≤ 2 α, to 2 % while A + B ≤ 3 α.
 
-    Parameters: scale g, known to the calibration's standard deviation, where that is not 0; dark signal b in sr⁻¹ where
-    it is not known. Both None where there is nothing to fit.
+    The base is seen at θ_i + δ_i and θ_o + δ_o, the angles that were read with their offsets: in measurements of one
+    plane θ_o is signed, positive on the mirror side. As for a tilt, the value is per irradiance at the θ_i that was
+    read: hence the ratio of cosines, which readings beside a panel at the same angle do not have.
 
-    Limits: for an ideal instrument the base itself; of a Lambertian base g k_d/π whatever the apertures.
+    Parameters: scale g, known to the calibration's standard deviation, where that is not 0; dark signal b in sr⁻¹ where
+    it is not known; factor w of the half-angles, known to their error; offsets δ_i and δ_o in degrees, known to the
+    angles' error. None where there is nothing to fit.
+
+    Limits: for an ideal instrument the base itself; of a Lambertian base g k_d/π whatever the apertures. In one plane
+    with one incidence only δ_i + δ_o is determined.
 
     Reference: F. E. Nicodemus et al., Geometrical considerations and nomenclature for reflectance, NBS 1977.
     """
@@ -53,12 +67,30 @@ class Seen(AbstractShown):
         doc="dark signal and stray light, as f_r cosθ_o",
     )  # fmt: skip
 
+    aperture: Scalar | None = param(
+        0.1, 10.0, symbol="w", scale="log", optional=True, starts=(1.0,),
+        doc="factor of the half-angles of source and receiver; 1 where they are as stated",
+    )  # fmt: skip
+    theta_i_offset: Scalar | None = _offset("δ_i", "θ_i")
+    theta_o_offset: Scalar | None = _offset("δ_o", "θ_o")
+    signed: bool = eqx.field(static=True, default=True)
+    # Whether θ_o counts from the mirror side's to the light's, as in measurements of one plane; else from the normal.
+
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """The module's formula."""
         cones = self.instrument.source + self.instrument.receiver > 0
-        shown = self._averaged(wi, wo) if cones else self.base(wi, wo)
+        light, sensor, ratio = self._there(wi, wo)
+        shown = (self._averaged(light, sensor) if cones else self.base(light, sensor)) * ratio
         shown += self._dark / jnp.maximum(wo[2], COS_MIN)
         return (1.0 if self.scale is None else self.scale) * jnp.where(above(wi, wo), shown, 0.0)
+
+    def _there(self, wi: Vec3, wo: Vec3) -> tuple[Vec3, Vec3, Scalar | float]:
+        """The directions in truth, and the cosine of the light's there over that where it was read."""
+        if self.theta_i_offset is None or self.theta_o_offset is None:
+            return wi, wo, 1.0
+        moved = jnp.deg2rad(self.theta_i_offset), jnp.deg2rad(self.theta_o_offset)
+        light, sensor = displaced(wi, wo, *moved, signed=self.signed)
+        return light, sensor, jnp.maximum(light[2], 0.0) / jnp.maximum(wi[2], COS_MIN)
 
     @property
     def _dark(self) -> Scalar:
@@ -66,9 +98,31 @@ class Seen(AbstractShown):
 
     def _averaged(self, wi: Vec3, wo: Vec3) -> Spectrum:
         rule = cone_rule(self.instrument.source, self.instrument.receiver)
-        lights, sensors = jnp.asarray(rule[0]) @ _frame(wi), jnp.asarray(rule[1]) @ _frame(wo)
+        lights, sensors = (self._widened(part) @ _frame(w) for part, w in zip(rule, (wi, wo), strict=False))
         product = jnp.asarray(rule[2]) * lights[:, 2] * sensors[:, 2]
         return product @ jax.vmap(self.base)(lights, sensors) / jnp.maximum(jnp.sum(product), COS_MIN)
+
+    def _widened(self, about: np.ndarray) -> jax.Array:
+        """Directions about +z, their offsets from it as much wider as the half-angles are."""
+        if self.aperture is None:
+            return jnp.asarray(about)
+        aside = jnp.asarray(about[:, :2]) * self.aperture
+        up = jnp.sqrt(jnp.maximum(1.0 - jnp.sum(aside**2, axis=1, keepdims=True), 0.0))
+        return jnp.concatenate([aside, up], axis=1)
+
+
+def displaced(wi: Any, wo: Any, of_light: Any, of_sensor: Any, *, signed: bool) -> tuple[Any, Any]:
+    """Pairs of directions at other zenith angles, of one pair or of many; NumPy's arrays or JAX's.
+
+    Args:
+        wi: Unit vectors to the light.
+        wo: Unit vectors to the sensor.
+        of_light: What is added to θ_i, radians; broadcasts with (..., 1).
+        of_sensor: The same of θ_o.
+        signed: Whether θ_o is signed, positive on the mirror side.
+    """
+    ahead = forward(wi, wo)
+    return turned(wi, -ahead, of_light), turned(wo, ahead if signed else -forward(wo, wo), of_sensor)
 
 
 def _frame(w: Vec3) -> Float[jax.Array, "3 3"]:
