@@ -16,6 +16,7 @@ import fitmat as fm
 from fitmat.errors import ModelError
 from fitmat.exports import mitsuba as target
 from fitmat.exports.verification import Difference, compared, directions, exact
+from fitmat.maths.directions import from_angles
 from fitmat.models.base import AbstractBRDF
 
 AGREE = 1e-4
@@ -120,3 +121,22 @@ def test_a_name_is_a_comment_and_nothing_else(mitsuba: ModuleType) -> None:
 def test_what_mitsuba_cannot_hold_is_refused(build: Callable[[], AbstractBRDF], sentence: str) -> None:
     with pytest.raises(ModelError, match=sentence):
         target.translated(build())
+
+
+@pytest.mark.study
+def test_what_mitsuba_shows_is_fitted_back(mitsuba: ModuleType) -> None:
+    """Its values on a goniometer's angles, with 1 % noise: every parameter within two standard deviations."""
+    truth: dict[str, Any] = {"kd": 0.3, "alpha": 0.2, "eta": 1.6}
+    plugin = target.translated(fm.model("lambert+walter-ggx", **truth))
+    theta_i, theta_o = (a.ravel() for a in np.meshgrid(np.deg2rad([10, 30, 50, 70]), np.deg2rad(np.arange(-80, 81, 4))))
+    wi = from_angles(theta_i, 0.0 * theta_i).astype(np.float32)
+    wo = from_angles(np.abs(theta_o), np.where(theta_o > 0.0, np.pi, 0.0)).astype(np.float32)
+    value = target.run(plugin, wi, wo)[0][1][:, 0]
+    sigma = 0.01 * value
+    noisy = value + sigma * np.random.default_rng(3).standard_normal(len(value))
+    fit = fm.fit(fm.from_arrays(theta_i, theta_o, noisy, sigma=sigma), "lambert+walter-ggx", fixed={"ks": 1.0})
+    sd = np.sqrt(np.diagonal(fit.covariance))
+    found = {e.name: (fit.values[e.place.start], sd[e.place.start]) for e in fit.entries if e.name != "ks"}
+    assert found.keys() == truth.keys()
+    for name, (best, error) in found.items():
+        assert abs(best - truth[name]) < 2.0 * error < 0.05 * truth[name], (name, best, error)

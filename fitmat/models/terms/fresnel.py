@@ -191,11 +191,7 @@ def conductor(cos_d: Numbers | float, eta: Numbers, kappa: Numbers) -> Numbers:
 
 def fresnel_glsl(call: str) -> str:
     """The reflectance at a cosine, c, in GLSL."""
-    return f"""
-vec3 fresnel(float c) {{
-    return {call};
-}}
-"""
+    return f"\nvec3 fresnel(float c) {{\n    return {call};\n}}\n"
 
 
 @overload
