@@ -245,7 +245,8 @@ def main() -> None:
             lines.flush()
             if len(found) % 50 == 0:
                 print(f"{(time.monotonic() - begin) / 60:.1f} min: {len(found)} cases", flush=True)
-    misfit_pages.write(found, chosen.out, chosen.seed)
+    again = [f"--{name} {getattr(chosen, name)}" for name in ("surfaces", "right", "chains", "seed")]
+    misfit_pages.write(found, chosen.out, " ".join(again))
 
 
 if __name__ == "__main__":

@@ -78,14 +78,14 @@ same intervals: standard deviations of the widened differences, emcee's over Lap
 
 ## Again
 
-    python benchmarks/misfit.py --seed {seed}
+    python benchmarks/misfit.py {options}
 
 {machine}
 """
 
 
-def write(found: Sequence[Line], out: Path, seed: int) -> None:
-    """`misfit.md` and its picture, from what `misfit.judged` found."""
+def write(found: Sequence[Line], out: Path, options: str) -> None:
+    """`misfit.md` and its picture, from what `misfit.judged` found with these options."""
     laplace = [line for line in found if line["method"] == "laplace"]
     wrong, right = _rows(laplace, right=False), _rows(laplace, right=True)
     ratios = _ratios(found)
@@ -105,7 +105,7 @@ def write(found: Sequence[Line], out: Path, seed: int) -> None:
         chains=len({line["case"] for line in found if line["method"] == "emcee"}),
         ratio=f"{statistics.median(ratios):.3f}" if ratios else "–",
         ratio_range=" to ".join(f"{x:.2f}" for x in np.quantile(ratios, [0.05, 0.95])) if ratios else "–",
-        seed=seed,
+        options=options,
         machine=machine.described(),
     )
     (out / "misfit.md").write_text(page, encoding="utf-8")
