@@ -43,7 +43,7 @@ class Candidate:
     Attributes:
         posterior: Of its fit.
         evidence: By leaving out single values; None where there are too many.
-        behind: By how much its elpd is below the best; 0 for the best, NaN where it has none.
+        behind: By how much its elpd is below the highest; NaN where it has none.
         behind_se: Standard error of that difference.
         left_out: Errors of whole incidences that were left out; None where there is only one.
         broken: Laws that it breaks, in words.
@@ -91,7 +91,9 @@ class Choice:
     """Several models of the same measurements, the best first.
 
     Attributes:
-        candidates: By elpd where any has one, else by AICc; those without such a number are not weighed and come last.
+        candidates: First those that are not clearly behind, the fewest parameters first: the data do not ask for more
+            (the rule of one standard error: Breiman, Friedman, Olshen & Stone 1984, sec. 3.4.3). Then the others by
+            elpd, where any has one, else by AICc; those without such a number are not weighed and come last.
     """
 
     candidates: tuple[Candidate, ...]
@@ -158,6 +160,15 @@ class Choice:
             f"{follows.behind:.0f}{error} ({by})."
         )
 
+    def _whole(self, candidate: Candidate) -> str:
+        """By how much its elpd of incidences left out differs from the first one's, with the error over incidences."""
+        one, first = candidate.left_out, self.best.left_out
+        if one is None or first is None or not np.isfinite(one.elpd - first.elpd).all():
+            return ""
+        apart = one.elpd - first.elpd
+        error = float(np.sqrt(len(apart)) * apart.std(ddof=1))
+        return "0" if candidate is self.best else f"{apart.sum():.1f} ± {error:.1f}"
+
     def _rows(self) -> list[tuple[str, ...]]:
         return [
             (
@@ -165,10 +176,11 @@ class Choice:
                 f"{c.fit.aicc:.1f}",
                 f"{c.fit.bic:.1f}",
                 "" if c.evidence is None or not c.weighed else f"{c.evidence.elpd:.1f} ± {c.evidence.se:.1f}",
-                "not weighed" if not c.weighed else "0" if c is self.best else f"{-c.behind:.1f} ± {c.behind_se:.1f}",
+                "not weighed" if not c.weighed else "0" if c.behind == 0 else f"{-c.behind:.1f} ± {c.behind_se:.1f}",
                 "" if c.evidence is None or not c.weighed else f"{c.evidence.p_loo:.1f}",
                 "" if c.left_out is None else f"{c.left_out.error:.3g}",
                 "" if c.left_out is None else f"{c.left_out.surprise:.2g}",
+                self._whole(c),
                 "; ".join((*c.broken, *c.doubts)),
             )
             for c in self.candidates
@@ -179,7 +191,8 @@ class Choice:
         return text_table(self.verdict, self._rows())
 
     def _repr_html_(self) -> str:
-        headings = ("model", "AICc", "BIC", "elpd", "to the best", "p_loo", "incidence left out", "as z", "remarks")
+        headings = ("model", "AICc", "BIC", "elpd", "to the highest", "p_loo", "incidence left out", "as z",
+            "its elpd to the first", "remarks")  # fmt: skip
         return html_table(self.verdict, headings, self._rows())
 
 
@@ -242,7 +255,7 @@ def choose(posteriors: Sequence[Posterior], *, predicting: bool = True, singly: 
         )
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         weighed = pool.map(lambda p: weigh(p) if singly else None, usable)
-        left = pool.map(lambda p: leave_incidences_out(p.fit) if predicting else None, usable)
+        left = pool.map(lambda p: leave_incidences_out(p.fit, densities=singly) if predicting else None, usable)
         found, unseen = list(weighed), list(left)
     scores = [np.nan if e is None else e.elpd for e in found]
     if not np.isfinite(scores).any():
@@ -258,4 +271,10 @@ def choose(posteriors: Sequence[Posterior], *, predicting: bool = True, singly: 
         error = float(np.sqrt(len(apart)) * apart.std())
         against = broken_laws(fit), doubts(fit)
         candidates.append(Candidate(posterior, proof, float(scores[best] - score), error, out, *against))
-    return Choice(tuple(sorted(candidates, key=lambda c: (not c.weighed, c.behind))))
+    return Choice(tuple(sorted(candidates, key=_rank)))
+
+
+def _rank(candidate: Candidate) -> tuple[bool, bool, int, float]:
+    """Smaller is better."""
+    parameters = 0 if candidate.clearly_behind else candidate.fit.n_inferred
+    return not candidate.weighed, candidate.clearly_behind, parameters, candidate.behind

@@ -8,13 +8,21 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.fitting.likelihood import misfits
+from fitmat.fitting.information import information
+from fitmat.fitting.likelihood import log_pointwise, misfits
 from fitmat.fitting.refining import optima
 from fitmat.fitting.result import Fit
+from fitmat.judgement.evidence import MOST_LEFT_OUT
 from fitmat.judgement.prediction import predictions
 from fitmat.measurements.incidences import incidences
 from fitmat.models.metrics import cube_root
+from fitmat.models.parameters import with_vector
 from fitmat.text import brief
+from fitmat.uncertainty.density import physical
+from fitmat.uncertainty.laplace import draws
+
+DRAWS = 100
+"""Of each refit, behind its predictive density."""
 
 MOST_REFITTED = 50_000
 """Values above which nothing is refitted."""
@@ -32,6 +40,8 @@ class LeftOut:
             is as good as promised; NaN where the loss promises nothing.
         values: How many values were predicted.
         settled: Whether the refit converged.
+        elpd: Log predictive density of the incidence's values by the fits to all others, nats; NaN where that was not
+            asked.
     """
 
     names: tuple[str, ...]
@@ -40,6 +50,7 @@ class LeftOut:
     z: np.ndarray
     values: np.ndarray
     settled: np.ndarray
+    elpd: np.ndarray
 
     __repr__ = brief
 
@@ -59,7 +70,7 @@ class LeftOut:
         return self.names[int(np.argmax(np.nan_to_num(self.z)))]
 
 
-def leave_incidences_out(fit: Fit) -> LeftOut | None:
+def leave_incidences_out(fit: Fit, *, densities: bool = False) -> LeftOut | None:
     """Refit without each incidence in turn, from the optimum of all, and predict it.
 
     Left-out values have weight 0, so that the program that fitted all serves for each. Where there are many angles,
@@ -67,6 +78,7 @@ def leave_incidences_out(fit: Fit) -> LeftOut | None:
 
     Args:
         fit: A fit that is finite.
+        densities: Whether to ask for predictive densities as well, up to `MOST_LEFT_OUT` values.
 
     Returns:
         The errors; None for a single incidence, where nothing would be left, for what is not finite, and above
@@ -85,7 +97,23 @@ def leave_incidences_out(fit: Fit) -> LeftOut | None:
     promised = fit.loss.posterior
     angles = np.array([g.theta_i_deg for g in groups])
     count = left.sum(axis=(1, 2))
-    return LeftOut(tuple(g.name for g in groups), angles, cube, z if promised else z * np.nan, count, settled)
+    elpd = np.full(len(groups), np.nan)
+    if densities and promised and fit.n_values <= MOST_LEFT_OUT:
+        elpd = np.array([_density(fit, values[k], float(s[k]), left[k]) for k in range(len(groups))])
+    return LeftOut(tuple(g.name for g in groups), angles, cube, z if promised else z * np.nan, count, settled, elpd)
+
+
+def _density(fit: Fit, values: Float[np.ndarray, " p"], s: float, left: Float[np.ndarray, "n c"]) -> float:
+    """Σ ln p(y | all other incidences) over the values that were left out, by Laplace's draws around the refit."""
+    data = dataclasses.replace(fit.data, weight=np.asarray(fit.data.weight) - left)
+    best = with_vector(fit.model, values)
+    known = information(best, data, s, fit.free)
+    refit = dataclasses.replace(fit, model=best, data=data, discrepancy=s, information=known)
+    drawn, spreads = physical(refit, draws(refit, DRAWS, np.random.default_rng(0)))
+    used, logs = left > 0, np.empty((DRAWS, int(np.count_nonzero(left))))
+    for part, x, noise, spread in predictions(fit, drawn, spreads):
+        logs[part] = log_pointwise(x, noise, fit.data, spread)[:, used]
+    return float(np.sum(np.logaddexp.reduce(logs, axis=0) - np.log(DRAWS)))
 
 
 def _refitted(fit: Fit, weights: Float[np.ndarray, "k n c"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

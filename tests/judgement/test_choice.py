@@ -263,3 +263,27 @@ def test_what_cannot_be_weighed_is_refused(linear: Fit, rough: Choice) -> None:
     eyes = fm.fit(linear.measurements, "lambert", loss="cube-root")
     with pytest.raises(FitmatError, match="the loss cube-root is no likelihood, so that it weighs no models"):
         fm.choose([Posterior(eyes, "laplace", eyes.values[None], np.zeros(1))])
+
+
+def test_the_density_of_an_incidence_is_that_of_the_fit_to_all_others(linear: Fit) -> None:
+    """Each value of it is N(mean of the others, σ² + variance of that mean), by 100 draws."""
+    m, found = linear.measurements, leave_incidences_out(linear, densities=True)
+    assert found is not None
+    assert m.sigma is not None
+    for k, angle in enumerate(INCIDENCES):
+        here = np.isclose(m.theta_i, angle)
+        mean, variance = left_out_mean(linear, ~here)
+        exact = stats.norm.logpdf(m.value[here, 0], mean, np.hypot(m.sigma[here, 0], np.sqrt(variance))).sum()
+        assert found.elpd[k] == pytest.approx(exact, abs=SUM)
+    plain = leave_incidences_out(linear)
+    assert plain is not None
+    assert np.isnan(plain.elpd).all()
+
+
+def test_of_models_that_are_as_good_the_one_with_fewer_parameters_is_first(linear: Fit) -> None:
+    """Oren–Nayar of σ = 0 is Lambert: the elpd differs by chance only."""
+    more = fm.fit(linear.measurements, "oren-nayar", loss="gaussian")
+    found = fm.choose([fm.laplace(more, seed=1), fm.laplace(linear, seed=1)], predicting=False)
+    assert [c.name for c in found.candidates] == ["lambert", "oren-nayar"]
+    assert min(c.behind for c in found.candidates) == 0.0
+    assert found.verdict.startswith("The data do not decide between lambert and oren-nayar")
