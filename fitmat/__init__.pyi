@@ -37,6 +37,7 @@ from .judgement.predictive_check import check_predictions as check_predictions
 from .uncertainty.second_sampler import check_posterior as check_posterior
 from .judgement.calibration import calibrate as calibrate
 from .judgement.design.design import next_angles as next_angles
+from .judgement.laboratories.comparing import compare_laboratories as compare_laboratories
 
 # Match
 from .match.match import compare as compare

@@ -45,6 +45,7 @@ from fitmat.cli.flags.fitting import (
 from fitmat.cli.flags.given import Command
 from fitmat.cli.flags.groups import takes
 from fitmat.cli.flags.instrument import instrument
+from fitmat.cli.flags.labs import LaboratoriesFlag, SurfaceFlag
 from fitmat.cli.flags.models import CheckFlag, NameFlag
 from fitmat.cli.flags.reading import reading
 from fitmat.cli.flags.simulate import (
@@ -287,6 +288,31 @@ def design(
     process.say(design.as_json(found) if json_ else design.as_text(found))
     if plot is not None:
         design.draw(found, plot)
+
+
+@app.command(
+    cls=Command,
+    epilog=examples.LABS,
+)
+@takes(reading, instrument)
+def labs(
+    reading: dict[str, Any],
+    instrument: Any,
+    laboratories: LaboratoriesFlag,
+    model: SurfaceFlag = "lambert+ggx",
+    json_: JsonFlag = False,
+    fix: FixFlag = None,
+) -> None:
+    """Say whether laboratories that measured one sample agree, what follows from all, and whose calibration is off."""
+    process.set_up()
+    from fitmat.cli import labs
+    from fitmat.models.parameters import assignments
+
+    found = labs.compared(laboratories, reading | {"instrument": instrument}, model, assignments(fix or [], "--fix"))
+    if json_:
+        process.say(labs.as_json(found))
+    else:
+        labs.show(found)
 
 
 @app.command(cls=Command)

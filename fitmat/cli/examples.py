@@ -39,6 +39,13 @@ DESIGN = (
     "  fitmat design measurements.csv --for match --kind curve --plot next.png"
 )
 
+LABS = (
+    "What the flags state of the instrument holds for each laboratory by itself: with --calibration 0.03 the scale of "
+    "each may be off by 3 % of its own.\n\n"
+    "Examples:\n\n  fitmat labs a.csv b.csv c.csv\n\n"
+    "  fitmat labs a.csv b.csv --model lambert+beckmann --calibration 0.03 --angle-error 0.1 --json"
+)
+
 EXPORT = (
     "Written to --out for glsl: NAME.glsl, the function vec3 brdf(vec3 wi, vec3 wo) to paste; NAME.vert and NAME.frag, "
     "which light with it; for mitsuba: NAME.py, the dictionary, and NAME.xml, a scene to include. With them "

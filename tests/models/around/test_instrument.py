@@ -266,20 +266,25 @@ def test_a_tilt_beside_an_error_of_the_angles_is_refused() -> None:
 
 @pytest.mark.study
 def test_errors_of_the_angles_are_covered() -> None:
-    """95 % intervals over 500 data sets with offsets and jitter of 0.2° drawn for each: where that is said, and not."""
+    """95 % intervals over 500 data sets with offsets and jitter of 0.2° drawn for each: where that is said, and not.
+
+    Where it is not, readings that count as independent hold the truth far less often; what the correlation of the
+    misfit adds holds it, by intervals that are wider than those of the fit that is told.
+    """
     said = Instrument(angle_error=0.2 * DEGREE)
     truth: dict[str, Any] = {"kd": 0.3, "ks": 1.0, "alpha": 0.1, "eta": 1.5}
-    inside: dict[bool, list[list[bool]]] = {True: [], False: []}
+    told, alone = [], []
     for seed in range(500):
         m = fm.simulate(fm.model("lambert+ggx", **truth), THETA_I, THETA_O, relative_noise=0.01, absolute_noise=1e-3,
                         seed=seed, instrument=said)  # fmt: skip
-        for known in inside:
-            fit = fm.fit(m if known else dataclasses.replace(m, instrument=IDEAL), "lambert+ggx")
-            inside[known].append([abs(z) < 1.96 for z in deviations(fit, **truth)])
-    covered = {known: dict(zip(truth, np.mean(found, axis=0), strict=True)) for known, found in inside.items()}
+        told.append([abs(z) < 1.96 for z in deviations(fm.fit(m, "lambert+ggx"), **truth)])
+        blind = fm.fit(dataclasses.replace(m, instrument=IDEAL), "lambert+ggx")
+        sd, places = np.sqrt(np.diagonal(blind.likelihood_covariance)), {e.name: e.place.start for e in blind.entries}
+        alone.append([abs(blind.values[places[n]] - true) < 1.96 * sd[places[n]] for n, true in truth.items()])
+    covered = [dict(zip(truth, np.mean(found, axis=0), strict=True)) for found in (told, alone)]
     print(covered)
-    assert all(0.93 <= share <= 0.97 for share in covered[True].values())
-    assert min(covered[False].values()) < 0.8
+    assert all(0.93 <= share <= 0.97 for share in covered[0].values())
+    assert min(covered[1].values()) < 0.7
 
 
 def test_an_instrument_says_what_it_does() -> None:
