@@ -284,7 +284,7 @@ def test_errors_of_the_angles_are_covered() -> None:
         alone.append([abs(blind.values[places[n]] - true) < 1.96 * sd[places[n]] for n, true in truth.items()])
     covered = [dict(zip(truth, np.mean(found, axis=0), strict=True)) for found in (told, alone)]
     print(covered)
-    assert all(0.92 <= share <= (0.99 if name == "kd" else 0.97) for name, share in covered[0].items())
+    assert all(0.93 <= share <= (0.99 if name == "kd" else 0.97) for name, share in covered[0].items())
     assert min(covered[1].values()) < 0.7
 
 
