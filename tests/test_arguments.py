@@ -120,7 +120,10 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
     ),
     "Instrument": (
         {},
-        {**dict.fromkeys(("source", "receiver", "calibration"), NUMBER), "dark": without(NUMBER, NOTHING)},
+        {
+            **dict.fromkeys(("source", "receiver", "calibration", "angle_error", "aperture_error"), NUMBER),
+            "dark": without(NUMBER, NOTHING),
+        },
     ),
     "examine": ({"measurements": MEASURED}, {"measurements": without(NOUN, fm.Measurements)}),
     "simulate": (
@@ -232,6 +235,15 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
     "choose": (
         {"posteriors": [POSTERIOR]},
         {"posteriors": (*NOUN, POSTERIOR, [FIT], [None]), "predicting": FLAG, "singly": FLAG},
+    ),
+    "compare_laboratories": (
+        {"measurements": [MEASURED, MEASURED]},
+        {
+            "measurements": (None, 5, MEASURED, [], [MEASURED], [FIT, FIT], [MEASURED, "a.csv"], [MEASURED, MEASURED]),
+            "name": (None, *TEXT),
+            "names": (5, "ab", FIT),
+            "fixed": (),
+        },
     ),
     "check_predictions": ({"posterior": POSTERIOR, "seed": 1}, {"posterior": NOUN, "seed": WHOLE}),
     "check_posterior": (

@@ -107,6 +107,8 @@ class Chosen:
     channels: tuple[str, ...]
     parameters: tuple[Quantity, ...]
 
+    __repr__ = brief
+
 
 def export(
     material: Material,

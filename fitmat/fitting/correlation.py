@@ -113,11 +113,12 @@ def correlate(
     none = _unchanged(data, moved.count, count)
     if linear is None or not np.isfinite(np.where(linear.used, linear.r, 0.0)).all() or not linear.r[linear.used].any():
         return none
-    inside, h, used, slopes = linear.inside, linear.factor, linear.used, linear.slopes
-    places, near = _places(best, linear.data)
+    inside, h = linear.inside, linear.factor
+    first, r, slopes, used = _apart(linear)
+    places, near = (part[first] for part in _places(best, linear.data))
     some = np.any(used, axis=1)
     parts = kernel(places, np.stack([some & near, some & ~near]))
-    found, counts = find(linear.r, slopes, used, parts), counted(used, parts)
+    found, counts = find(r, slopes, used, parts), counted(used, parts)
     asked, half = found.gain >= ASKED, np.linalg.solve(h, meat(found, slopes, counts, parts.rows, linear.more))
     ratio, axes = np.linalg.eigh(np.linalg.solve(h, half.T))
     least = 1.0 + 2.0 * rho / (1.0 - rho) / (1.0 + s / float(data.typical)) ** 2
@@ -136,6 +137,23 @@ def _unchanged(data: Data, parameters: int, count: int) -> Correlation:
     channels = data.x.shape[1]
     parts = np.zeros((channels, 2)), np.nan, np.full(channels, np.nan), np.eye(parameters), np.ones(parameters)
     return Correlation(*parts, float(count), "not judged")
+
+
+def _apart(linear: Linear) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """First rows of distinct directions; their residuals, slopes and which are in use, repeats added up over √m.
+
+    Errors that repeats have in common are no misfit that neighbours share.
+    """
+    pairs = np.round(np.concatenate([linear.data.wi, linear.data.wo], axis=1), 9)
+    _, first, group = np.unique(pairs, axis=0, return_index=True, return_inverse=True)
+    if len(first) == len(pairs):
+        return np.arange(len(pairs)), linear.r, linear.slopes, linear.used
+    found = [np.zeros((len(first), *part.shape[1:])) for part in (linear.r, linear.slopes, linear.used)]
+    for sums, part in zip(found, (np.where(linear.used, linear.r, 0.0), linear.slopes, linear.used), strict=True):
+        np.add.at(sums, group.ravel(), part)
+    r, slopes, count = found
+    root = np.sqrt(np.maximum(count, 1.0))
+    return first, r / root, slopes / root[..., None], count > 0
 
 
 def _places(best: AbstractBRDF, data: Data) -> tuple[Float[np.ndarray, "n 3"], Bool[np.ndarray, " n"]]:

@@ -18,6 +18,11 @@ ROUNDING = 1e-15
 """λ is at least this fraction of the largest eigenvalue of JᵀJ, roughly: its factor stays finite."""
 
 
+FEW = 8
+"""Parameters of which each has its own code for its column of J: twice as fast to run as one code for all of them, but
+longer to compile."""
+
+
 class Normal(NamedTuple):
     """What a Gauss–Newton step needs of all residuals: Σ r², Jᵀr and JᵀJ."""
 
@@ -57,13 +62,14 @@ def _seen(
     residual: Callable[[Float[Array, " p"]], tuple[Array, Any]], x: Float[Array, " p"]
 ) -> tuple[Normal, Any, float]:
     """The normal equations at x, what the residuals come with, and how many they are."""
-
-    def along(e: Array) -> tuple[Array, Array, Any]:
-        r, column, beside = jax.jvp(residual, (x,), (e,), has_aux=True)
-        return r.ravel(), column.ravel(), beside
-
-    r, columns, beside = jax.vmap(along, out_axes=(None, 0, None))(jnp.eye(len(x)))
+    r, along, beside = jax.linearize(lambda at: _flat(residual(at)), x, has_aux=True)
+    ways = jnp.eye(len(x))
+    columns = jnp.stack([along(e) for e in ways]) if 0 < len(x) <= FEW else jax.vmap(along)(ways)
     return Normal(r @ r, columns @ r, columns @ columns.T), beside, float(r.size)
+
+
+def _flat(seen: tuple[Array, Any]) -> tuple[Array, Any]:
+    return seen[0].ravel(), seen[1]
 
 
 def least_squares(

@@ -88,6 +88,6 @@ def _table(found: Findings) -> Table:
         table.add_column(heading, no_wrap=True)
     for row in parameter_rows(found):
         name = f"→ {row['name']}" if row["kind"] == "follows" else row["name"]
-        remark = " ".join(part for part in (row["unit"], row["remark"].removesuffix(" by these angles")) if part)
+        remark = " ".join(part for part in (row["unit"], row["remark"]) if part)
         table.add_row(*(Text(visible(cell)) for cell in (name, row["symbol"], row["value"], row["interval"], remark)))
     return table

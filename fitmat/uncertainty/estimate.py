@@ -42,7 +42,7 @@ class Quantity:
         sd: Standard deviation, (k,); NaN where `remarks` says why there is none.
         ci95: 95 % interval, (k, 2).
         per_channel: Whether the k entries are channels.
-        remarks: (k,); "" or a reason: "fixed", "at its lower bound", "not determined by these angles".
+        remarks: (k,); "" or a reason: "fixed", "at its lower bound", "not determined".
     """
 
     name: str

@@ -18,7 +18,7 @@ from fitmat.models.terms.fresnel import eta_from_f0, f0_from_eta
 from fitmat.uncertainty.estimate import Quantity, limits
 from fitmat.uncertainty.posterior import Posterior
 
-UNDETERMINED = "not determined by these angles"
+UNDETERMINED = "not determined"
 """Remark on what has an interval but no value to rely on."""
 
 SEVERAL = "another optimum fits as well"

@@ -58,6 +58,18 @@ def test_the_label_of_the_catalogue_is_found(identified: Identifiability) -> Non
     assert identified.spectrum[0] < 1.0 < identified.spectrum[1]  # one direction is lost, and one only
 
 
+def test_what_a_misfit_leaves_open_is_not_put_down_to_the_angles() -> None:
+    """Blinn–Phong of a microfacet surface: were every misfit its own, the exponent would be known to a fifth."""
+    fit = fm.fit(fm.read(CATALOGUE / "satin-plastic.csv"), "lambert+blinn-phong")
+    found = identify(fm.laplace(fit, seed=1))
+    (exponent,) = (v for v in found.verdicts if v.name == "exponent")
+    assert np.sqrt(fit.likelihood_covariance[2, 2]) / fit.values[2] < 0.3
+    assert exponent.state == STATES[2]
+    assert exponent.misfit
+    assert "exponent is not determined, because the model misses the data: these angles would do." in found.words
+    assert "by these angles" not in found.words
+
+
 def test_what_is_determined_of_a_lost_pair_is_named(identified: Identifiability) -> None:
     (group,) = identified.groups
     assert set(group.names) == {"ks", "eta"}

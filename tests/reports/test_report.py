@@ -281,13 +281,13 @@ def test_a_picture_that_fails_is_a_sentence(studied, tmp_path, monkeypatch, blan
 @pytest.mark.parametrize(
     ("broken", "sentence", "files"),
     [
-        ("page._plot", r"report\.html lacks what could not be drawn: Measured .*, Corner plot of \S+ \(ValueError", 4),
+        ("page._plot", r"report\.html lacks what could not be drawn: Measured .*, Corner plot of \S+ \(ValueError", 5),
         (
             "page._environment",
             r"report\.html could not be made \(ValueError: no glyph\); .* saved in fit\.json",
-            3,
+            4,
         ),
-        ("page.files.write_text", r"report\.html could not be made \(ValueError: no glyph\); .* saved in fit\.json", 3),
+        ("page.files.write_text", r"report\.html could not be made \(ValueError: no glyph\); .* saved in fit\.json", 4),
     ],
     ids=["no Matplotlib", "no template", "no room for the page"],
 )
@@ -298,7 +298,7 @@ def test_the_numbers_are_on_disk_before_anything_is_drawn(
     (tmp_path / "whole").mkdir()
     assert page.write(tmp_path / "whole", studied) == ""
     numbers = {path.name: path.read_bytes() for path in (tmp_path / "whole").iterdir() if path.name != "report.html"}
-    assert sorted(numbers) == ["fit.json", *(f"posterior-{name}.parquet" for name in NAMES)]
+    assert sorted(numbers) == ["budget.txt", "fit.json", *(f"posterior-{name}.parquet" for name in NAMES)]
     monkeypatch.setattr(f"fitmat.reports.{broken}", torn)
     with pytest.warns(UserWarning, match=sentence) as told:
         page.report(studied, tmp_path / "made")
@@ -365,7 +365,7 @@ def test_what_is_not_determined_shows_no_error(studied):
     fit = dataclasses.replace(posterior.fit, result="unidentifiable", undetermined=("eta",))
     found = {row["name"]: row for row in parameter_rows(find(dataclasses.replace(posterior, fit=fit), ()))}
     for name in ("eta", "f0"):
-        assert found[name]["remark"] == "not determined by these angles"
+        assert found[name]["remark"] == "not determined"
         assert "±" not in found[name]["value"]
         assert "–" in found[name]["interval"]
     assert "±" in found["alpha"]["value"]

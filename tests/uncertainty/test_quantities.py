@@ -107,7 +107,7 @@ def test_remarks_say_why_a_number_is_missing(fit: Fit) -> None:
     assert found["kd"].remarks == ("at its upper bound",)
     assert found["ks"].remarks == ("at its lower bound",)
     assert found["eta"].remarks == ("fixed",)
-    assert found["alpha"].remarks == ("not determined by these angles",)
+    assert found["alpha"].remarks == ("not determined",)
     assert np.isnan([found[name].sd for name in ("kd", "ks", "eta")]).all()
 
 

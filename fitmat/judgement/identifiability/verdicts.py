@@ -36,7 +36,14 @@ WEAK_RANGE = 0.1 * UNDETERMINED["linear"]
 SMALL_WEIGHT = 0.01
 """Weights below this fraction of their range are judged as if they were that large: 0.001 ± 0.0005 is no question."""
 
-STATES = ("determined", "weakly determined", "not determined by these angles")
+STATES = ("determined", "weakly determined", "not determined")
+
+_WORDED = (
+    *((state, False, "") for state in STATES[:2]),
+    (STATES[2], False, " by these angles"),
+    (STATES[2], True, ", because the model misses the data: these angles would do"),
+)
+# State, whether for the misfit, and how a sentence goes on.
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -52,6 +59,7 @@ class Verdict:
         ci95: 95 % limits of the profile likelihood, physical; a bound where it is open.
         open: Which of them are bounds.
         elsewhere: Values of other optima that are as good, outside of what the curvature at the best fit promises.
+        misfit: Whether it is not determined for the misfit of the model alone: these angles would do.
         contraction: 1 − var_post/var_prior in natural coordinates; of a ridge that fills its bounds unevenly, the
             prior's volume may contract it though no datum does, which is why the profile is asked as well.
     """
@@ -64,6 +72,7 @@ class Verdict:
     ci95: tuple[float, float]
     open: tuple[bool, bool]
     elsewhere: tuple[float, ...]
+    misfit: bool
     contraction: float
 
     __repr__ = brief
@@ -106,7 +115,7 @@ class Identifiability:
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """Names of parameters, with their channel where there are several, that these angles do not determine."""
+        """Names of parameters, with their channel where there are several, that are not determined."""
         return tuple(v.name for v in self.verdicts if v.state == STATES[2])
 
     @property
@@ -115,10 +124,10 @@ class Identifiability:
         if not self.verdicts:
             return f"{self.fit.name} has no free parameter to determine."
         parts = []
-        for state in STATES:
-            names = [v.name for v in self.verdicts if v.state == state]
+        for state, misfit, why in _WORDED:
+            names = [v.name for v in self.verdicts if (v.state, v.misfit) == (state, misfit)]
             if names:
-                parts.append(f"{_listed(names)} {'is' if len(names) == 1 else 'are'} {state}.")
+                parts.append(f"{_listed(names)} {'is' if len(names) == 1 else 'are'} {state}{why}.")
         return " ".join([*parts, *self._several(), *(self._traded(g) for g in self.groups)])
 
     def _several(self) -> list[str]:
@@ -215,15 +224,19 @@ def _verdict(fit: Fit, profile: Profile, contraction: float, prior: float) -> Ve
     others = np.log(elsewhere) if log else np.array(elsewhere)
     low, high = min([profile.interval[0], *others]), max([profile.interval[1], *others])
     sd = (high - low) / (2.0 * LEVEL)
-    lost = entry.name in fit.undetermined or sd > (UNDETERMINED["log"] if log else UNDETERMINED["linear"] * span)
-    lost = lost or min(contraction, 1.0 - (sd / prior) ** 2) < CONTRACTED
+    most = min(UNDETERMINED["log"] if log else UNDETERMINED["linear"] * span, np.sqrt(1.0 - CONTRACTED) * prior)
+    blind = entry.name in fit.undetermined
+    lost = blind or sd > most or contraction < CONTRACTED
+    misfit = lost and not blind and fit.correlation.found
+    misfit = misfit and sd <= most * np.sqrt(fit.correlation.inflation[profile.place])
     if log or entry.param.weight:
         weak = sd / (1.0 if log else max(abs(value), SMALL_WEIGHT * span)) > WEAK
     else:
         weak = sd > WEAK_RANGE * span
     state = STATES[2] if lost else STATES[1] if weak or elsewhere or profile.missed > AGREE else STATES[0]
     ends = (float(np.exp(low)), float(np.exp(high))) if log else (float(low), float(high))
-    return Verdict(profile.name, entry.param.symbol, state, value, profile, ends, profile.open, elsewhere, contraction)
+    told = (value, profile, ends, profile.open, elsewhere, bool(misfit), contraction)
+    return Verdict(profile.name, entry.param.symbol, state, *told)
 
 
 def _listed(names: list[str]) -> str:

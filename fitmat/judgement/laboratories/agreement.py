@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.maths.normal import Z95
+from fitmat.text import brief
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -44,6 +45,8 @@ class Agreement:
     uncertainty: float
     ci95: tuple[float, float]
     agree: bool = True
+
+    __repr__ = brief
 
 
 def agreement(name: str, values: Float[np.ndarray, " L"], u: Float[np.ndarray, " L"]) -> Agreement:

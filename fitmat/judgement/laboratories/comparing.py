@@ -187,6 +187,7 @@ def compare_laboratories(
     for one in measurements:
         arguments.kind("one of measurements", one, Measurements)
     arguments.kind("name", name, str)
+    arguments.kind("names", names, list, tuple, optional=True)
     called = tuple(visible(n) for n in (names or [m.source for m in measurements]))
     _refuse_unlike(measurements, called)
     template = model(name, channels=len(measurements[0].channels))

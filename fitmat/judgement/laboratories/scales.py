@@ -20,7 +20,7 @@ from fitmat.measurements.samples import Measurements
 from fitmat.models.around.pooled import Pooled
 from fitmat.models.parameters import as_parameter
 from fitmat.models.registry import model
-from fitmat.text import visible
+from fitmat.text import brief, visible
 
 LEVEL = 0.05
 """Probability of a false alarm."""
@@ -48,6 +48,8 @@ class Scale:
     ci95: tuple[float, float]
     p: float
     off: bool
+
+    __repr__ = brief
 
 
 class _Factors(NamedTuple):
