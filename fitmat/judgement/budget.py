@@ -92,6 +92,8 @@ class Line:
         """Value, expanded uncertainty, and the sources of a hundredth of the variance or more."""
         if not self.parts:
             return f"{self.name}: {self.remark}."
+        if not self.combined > 0.0:
+            return f"{self.name} is {self.value:.4g}, without an uncertainty that could be stated."
         told = [f"{100 * share:.0f} % from {name}" for name, share in self.shares.items() if share >= 0.01]
         first, *others = told
         sure = f"{with_error(self.value, self.expanded)} (k = {COVERAGE:g}), of whose variance"
@@ -124,7 +126,7 @@ class Budget:
     @property
     def words(self) -> str:
         """Of the albedo, in a sentence or two; "" where it has no uncertainty."""
-        line = next((line for line in self.lines if line.name.startswith("albedo") and line.parts), None)
+        line = next((line for line in self.lines if line.name.startswith("albedo") and line.combined > 0.0), None)
         if line is None:
             return ""
         return " ".join(filter(None, [f"For light from {ALBEDO_DEG:g}° the {line.words}", self.unstated]))

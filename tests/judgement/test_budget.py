@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import fitmat as fm
-from fitmat.judgement.budget import Budget, draw_up
+from fitmat.judgement.budget import Budget, Line, draw_up
 from fitmat.measurements.instrument import Instrument
 from fitmat.uncertainty.quantities import derived, parameters
 
@@ -182,3 +182,9 @@ def test_an_objective_has_no_budget() -> None:
                     relative_noise=0.02, absolute_noise=1e-3, seed=0)  # fmt: skip
     posterior = fm.laplace(fm.fit(m, "lambert", loss="log10"), seed=0)
     assert draw_up(posterior, parameters(posterior), ()) is None
+
+
+@pytest.mark.parametrize("u", [0.0, np.nan])
+def test_what_has_no_uncertainty_is_a_sentence_all_the_same(u: float) -> None:
+    line = Line("albedo", "ρ", "1", 0.0, {"readings": u, "misfit": 0.0})
+    assert line.words == "albedo is 0, without an uncertainty that could be stated."
