@@ -3,8 +3,6 @@
 It fits nothing.
 """
 
-import dataclasses
-
 import numpy as np
 
 from fitmat.errors import ModelError
@@ -32,7 +30,7 @@ def seen(template: AbstractBRDF, m: Measurements) -> AbstractBRDF:
     return Seen(
         template,
         # Static, and what is fitted would be compiled for at each value.
-        dataclasses.replace(told, calibration=0.0, angle_error=0.0, aperture_error=0.0),
+        told.without_errors(),
         scale=as_parameter(1.0) if told.calibration else None,
         dark=np.clip(0.5 * dark, 1e-6, 0.5) if told.dark is None else None,
         aperture=as_parameter(1.0) if told.aperture_error else None,

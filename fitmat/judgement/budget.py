@@ -61,7 +61,7 @@ class Line:
         unit: "1" for none.
         value: At the best fit.
         parts: Source → its standard uncertainty; none where `remark` says why.
-        remark: "" or why there is no uncertainty: "fixed", "at its lower bound", "not determined by these angles".
+        remark: "" or why there is no uncertainty: "fixed", "at its lower bound", "not determined".
     """
 
     name: str

@@ -73,6 +73,10 @@ class Instrument:
         """Whether it shows the surface as it is."""
         return self == IDEAL
 
+    def without_errors(self) -> "Instrument":
+        """What it does to the values, without what it does not know of itself."""
+        return dataclasses.replace(self, calibration=0.0, angle_error=0.0, aperture_error=0.0)
+
     def __str__(self) -> str:
         """What is taken into account, in a sentence; empty for an ideal instrument."""
         parts = []

@@ -17,7 +17,7 @@ from fitmat.fitting.fitting import fit
 from fitmat.fitting.result import Fit
 from fitmat.judgement.budget import draw_up
 from fitmat.judgement.laboratories.agreement import Agreement, agreement
-from fitmat.judgement.laboratories.scales import LEVEL, Scale, apart_from_errors, scales_of
+from fitmat.judgement.laboratories.scales import LEVEL, Scale, scales_of
 from fitmat.judgement.multiplicity import adjusted_for_many
 from fitmat.judgement.propagation import OF_INSTRUMENT
 from fitmat.measurements.instrument import UNKNOWN_SCALE
@@ -215,7 +215,7 @@ def _refuse_unlike(measurements: Sequence[Measurements], names: tuple[str, ...])
         if m.instrument.calibration == UNKNOWN_SCALE:
             got = f"{name}: a scale of which nothing is known"
             raise FitmatError(f"{got} (--unknown-scale), expected one that can be compared. Leave it out.")
-        if apart_from_errors(m.instrument) != apart_from_errors(first.instrument):
+        if m.instrument.without_errors() != first.instrument.without_errors():
             got = f"{name} has other apertures or another dark signal than {names[0]}"
             raise FitmatError(f"{got}, expected the same: their scales are compared through one instrument.")
         for other, its in zip(measurements[:k], names, strict=False):

@@ -14,7 +14,6 @@ from jaxtyping import ArrayLike, Float
 
 from fitmat.fitting.fitting import fit
 from fitmat.maths.normal import Z95
-from fitmat.measurements.instrument import Instrument
 from fitmat.measurements.noise import measured_noise
 from fitmat.measurements.samples import Measurements
 from fitmat.models.around.pooled import Pooled
@@ -145,7 +144,7 @@ def _factors(measurements: Sequence[Measurements], name: str, held: Mapping[str,
         valid=own,
         channels=tuple(str(k + 1) for k in range(count)),
         source="all laboratories",
-        instrument=apart_from_errors(measurements[0].instrument),
+        instrument=measurements[0].instrument.without_errors(),
     )
     best = fit(
         pooled,
@@ -160,8 +159,3 @@ def _factors(measurements: Sequence[Measurements], name: str, held: Mapping[str,
         best.covariance[place, place] / np.outer(factors, factors),
         np.array([m.instrument.calibration for m in measurements]),
     )
-
-
-def apart_from_errors(told: Instrument) -> Instrument:
-    """What an instrument does to the values, without what it does not know of itself."""
-    return dataclasses.replace(told, calibration=0.0, angle_error=0.0, aperture_error=0.0)
