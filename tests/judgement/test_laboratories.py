@@ -110,6 +110,7 @@ def test_one_that_is_five_percent_off_is_named() -> None:
     assert told["quantities"]["kd"]["agree"] is False
 
 
+@pytest.mark.study
 def test_what_the_calibrations_state_is_no_difference() -> None:
     found = fm.compare_laboratories(measured(0.05, 0, told=Instrument(calibration=0.03)))
     assert found.agree
@@ -119,6 +120,7 @@ def test_what_the_calibrations_state_is_no_difference() -> None:
     assert found.scales[1].factor == pytest.approx(1.05, abs=0.01)  # the factor is told all the same
 
 
+@pytest.mark.study
 def test_of_two_nobody_knows_which() -> None:
     found = fm.compare_laboratories(measured(0.05, 0)[:2])
     assert found.unsettled == ("value",)

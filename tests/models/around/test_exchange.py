@@ -169,7 +169,7 @@ COATED = {
 }
 
 
-@pytest.mark.parametrize("name", always({"smooth over a metal"}, COATED))
+@pytest.mark.parametrize("name", always(set(), COATED))
 def test_values_and_slopes_are_finite_at_all_ends(name: str) -> None:
     """Every parameter at its end in all coats and lobes at once; grazing, normal and singular pairs."""
     model = COATED[name]

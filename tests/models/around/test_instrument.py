@@ -246,6 +246,7 @@ def test_jitter_is_the_spread_of_values_at_drawn_angles() -> None:
     assert not found.jitter[5:].any()
 
 
+@pytest.mark.study
 def test_noise_that_readings_show_has_their_jitter_in_it() -> None:
     truth, told = fm.model("lambert+ggx", kd=0.3, alpha=0.2, eta=1.5), Instrument(angle_error=0.2 * DEGREE)
     m = fm.simulate(truth, THETA_I, THETA_O, relative_noise=0.02, absolute_noise=1e-3, seed=0, give_sigma=False,
