@@ -9,7 +9,9 @@ import inspect
 import json
 import re
 import unicodedata
+from collections.abc import Collection, Iterator
 from importlib.resources import files
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import numpy as np
@@ -17,7 +19,8 @@ import numpy as np
 from fitmat.errors import ModelError
 from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, AbstractEstimated, Sum
-from fitmat.models.glsl import AbstractShaded, scalar, spectrum
+from fitmat.models.glsl import EVERY, AbstractShaded, scalar, spectrum
+from fitmat.models.parameters import entries
 from fitmat.models.registry import OVER
 
 COLOURS = (1, 3)
@@ -33,7 +36,8 @@ vec3 brdf(vec3 wi, vec3 wo) {{
 }}
 """
 
-_DECLARED = re.compile(r"^(?:const )?(?:float|vec2|vec3|Pair|struct) (\w+)", re.MULTILINE)
+_DECLARED = re.compile(r"^(?:(?:const |uniform )?(?:float|vec2|vec3|Pair|struct)|#define) (\w+)", re.MULTILINE)
+_FOLLOWS = re.compile(r"^const (?:float|vec2|vec3) (\w+) = ([^;]+);", re.MULTILINE)
 _PLAIN = {
     **{"−": "-", "·": ".", "×": "x", "√": "sqrt", "½": "1/2", "⅛": "1/8", "Σ": "sum", "′": "'"},
     **{"ē": "e_mean", "Ē": "E_mean"},
@@ -50,25 +54,63 @@ def translated(model: AbstractBRDF) -> str:
     Raises:
         ModelError: a lobe has no form in GLSL, or there are channels of another number.
     """
-    text, total = _sum(surface(model))
+    return _complete(model, free=False)
+
+
+class Parametrised(NamedTuple):
+    """A model in GLSL whose parameters are uniforms.
+
+    Attributes:
+        text: As `translated` writes it, but for the declarations of the parameters.
+        uniforms: Names of parameters, as `entries` has them → uniforms, float where the parameter is one number for
+            all channels, else vec3. What the shader holds numbers made from stays a constant and is not among them.
+    """
+
+    text: str
+    uniforms: dict[str, str]
+
+
+def parametrised(model: AbstractBRDF) -> Parametrised:
+    """The function `vec3 brdf(vec3 wi, vec3 wo)` with uniforms instead of the parameters' values.
+
+    Args:
+        model: As of `translated`; its values count for what is no uniform.
+
+    Raises:
+        ModelError: as `translated`.
+
+    Example:
+        >>> import fitmat as fm
+        >>> parametrised(fm.model("lambert+ggx-kc")).uniforms
+        {'kd': 'lambert_kd', 'ks': 'ggx_kc_ks'}
+    """
+    material = surface(model)
+    names = zip(entries(material), _uniforms(material), strict=True)
+    return Parametrised(_complete(material, free=True), {entry.name: name for entry, name in names if name})
+
+
+def _complete(model: AbstractBRDF, *, free: bool) -> str:
+    text, total = _sum(surface(model), free=free)
     text += BRDF.format(sum=total)
     return _needed(text) + text
 
 
-def _sum(model: AbstractBRDF) -> tuple[str, str]:
+def _sum(model: AbstractBRDF, *, free: bool) -> tuple[str, str]:
     """The functions of a model's lobes, and the expression that adds them up."""
     lobes = model.lobes if isinstance(model, Sum) else (model,)
-    return "".join(map(_lobe, lobes)), " + ".join(f"{_scope(lobe)}(wi, wo)" for lobe in lobes)
+    return "".join(_lobe(lobe, free=free) for lobe in lobes), " + ".join(f"{_scope(lobe)}(wi, wo)" for lobe in lobes)
 
 
-def _lobe(lobe: AbstractBRDF) -> str:
-    """The constants of a lobe, the functions of its parts and its own, each name with the lobe's before it."""
+def _lobe(lobe: AbstractBRDF, *, free: bool) -> str:
+    """The parameters of a lobe, the functions of its parts and its own, each name with the lobe's before it."""
     scope, own = _scope(lobe), lobe.glsl()
     if not own:
         why = "is estimated and has no formula; ggx-kc has" if isinstance(lobe, AbstractEstimated) else "is not"
         raise ModelError(f"{lobe.name} {why} translated into GLSL; expected a sum of lobes that have one, as ggx.")
     below, base = _base(lobe)
-    body = "\n\n".join(text.strip("\n") for text in (_constants(lobe), *base, *_parts(lobe), own)) + "\n"
+    values = "".join(_declaration(*each, free=free) for each in _parameters(lobe, lobe.numbers))
+    body = "\n\n".join(text.strip("\n") for text in (values, *base, *_parts(lobe), own)) + "\n"
+    body = _followed(body) if free else body
     named = re.compile(rf"(?<![\w.])({'|'.join(_DECLARED.findall(body))})\b")
 
     def scoped(line: str) -> str:
@@ -83,7 +125,7 @@ def _base(lobe: AbstractBRDF) -> tuple[str, list[str]]:
     inner = [getattr(lobe, f.name) for f in dataclasses.fields(lobe) if f.name == "base"]
     if not inner:
         return "", []
-    below, total = _sum(inner[0])
+    below, total = _sum(inner[0], free=False)
     return below, [f"vec3 base(vec3 wi, vec3 wo) {{\n    return {total};\n}}"]
 
 
@@ -92,19 +134,45 @@ def _scope(lobe: AbstractBRDF) -> str:
     return re.sub(r"\W", "_", lobe.name.partition(OVER)[0])
 
 
-def _constants(module: eqx.Module) -> str:
-    """Every parameter of a lobe and of its parts, as the shader's constant of that name."""
-    found = ""
+def _parameters(module: AbstractShaded, built_in: Collection[str]) -> Iterator[tuple[str, Any, bool, bool]]:
+    """Name, value, whether it is a spectrum and whether numbers are made from it, of a lobe and of its parts."""
     for field in dataclasses.fields(module):
         value = getattr(module, field.name)
         if "param" in field.metadata:
             size, p = np.size(value), field.metadata["param"]
             if size not in COLOURS:
                 raise ModelError(f"{field.name} has {size} channels, expected 1 or 3: a shader has three colours.")
-            found += (spectrum if p.per_channel or size > 1 else scalar)(field.name, value)
-        elif isinstance(value, eqx.Module) and not isinstance(value, AbstractBRDF):
-            found += _constants(value)
-    return found
+            yield field.name, value, p.per_channel or size > 1, field.name in built_in or EVERY in built_in
+        elif isinstance(value, AbstractShaded) and not isinstance(value, AbstractBRDF):
+            yield from _parameters(value, (*built_in, *value.numbers))
+
+
+def _declaration(name: str, value: Any, per_channel: bool, built_in: bool, *, free: bool) -> str:
+    """A parameter as the shader's constant or uniform of that name."""
+    if free and not built_in:
+        return f"uniform {'vec3' if per_channel else 'float'} {name};\n"
+    return (spectrum if per_channel else scalar)(name, value)
+
+
+def _uniforms(model: AbstractBRDF) -> Iterator[str]:
+    """The uniform of every parameter of a model, in the order of `entries`; "" for one that is none."""
+    for lobe in model.lobes if isinstance(model, Sum) else (model,):
+        own = [("" if held else f"{_scope(lobe)}_{name}") for name, _, _, held in _parameters(lobe, lobe.numbers)]
+        below = len(entries(lobe)) - len(own)  # of a cover, which holds every number
+        yield from [*own, *[""] * below]
+
+
+def _followed(body: str) -> str:
+    """Constants that follow from uniforms, which GLSL does not allow, as macros."""
+    free = set(re.findall(r"^uniform \w+ (\w+);", body, re.MULTILINE))
+
+    def macro(found: re.Match[str]) -> str:
+        if not free & set(re.findall(r"\w+", found[2])):
+            return found[0]
+        free.add(found[1])
+        return f"#define {found[1]} ({' '.join(found[2].split())})"
+
+    return _FOLLOWS.sub(macro, body)
 
 
 def _parts(module: eqx.Module) -> list[str]:

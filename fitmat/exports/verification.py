@@ -7,7 +7,7 @@ import base64
 import dataclasses
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any
 
@@ -20,8 +20,11 @@ from fitmat.maths.directions import from_angles, mirror, relative_azimuth, zenit
 from fitmat.models.base import AbstractBRDF, evaluate
 from fitmat.text import brief
 
-HEADER = "#version 300 es\nprecision highp float;\nprecision highp int;\n"
-"""What stands before a fragment shader in GLSL ES 3.00."""
+PAGE = "evaluate.html", "shader.js"
+"""What runs a shader, and the script in it."""
+
+Uniforms = Mapping[str, float | Sequence[float]]
+"""Values by the names of a shader's uniforms."""
 
 SHAPE = 128, 96
 """Pixels: one for each pair of directions."""
@@ -127,14 +130,22 @@ def difference(model: AbstractBRDF, source: str) -> Difference | None:
 
 
 def run(
-    sources: Sequence[str], wi: Float[np.ndarray, "n 3"], wo: Float[np.ndarray, "n 3"], program: str
+    sources: Sequence[str],
+    wi: Float[np.ndarray, "n 3"],
+    wo: Float[np.ndarray, "n 3"],
+    program: str,
+    *,
+    uniforms: Sequence[Uniforms] | None = None,
 ) -> tuple[list[Float[np.ndarray, "n 3"]], str]:
     """Values of each source at pairs of directions in single precision, as many as `SHAPE` has, and what ran them."""
     padded = [np.pad(w, ((0, 0), (0, 1))).astype("<f4").tobytes() for w in (wi, wo)]
-    told: dict[str, Any] = {"width": SHAPE[0], "height": SHAPE[1], "sources": [HEADER + text for text in sources]}
+    each = zip(sources, uniforms or [{}] * len(sources), strict=True)
+    told: dict[str, Any] = {"width": SHAPE[0], "height": SHAPE[1]}
+    told["sources"] = [{"text": text, "uniforms": values} for text, values in each]
     told |= {name: base64.b64encode(w).decode("ascii") for name, w in zip(("wi", "wo"), padded, strict=True)}
     given = json.dumps(told).replace("<", "\\u003c")  # which would end the script
-    page = files("fitmat.exports").joinpath("evaluate.html").read_text(encoding="utf-8").replace("GIVEN", given, 1)
+    page, script = (files("fitmat.exports").joinpath(name).read_text(encoding="utf-8") for name in PAGE)
+    page = page.replace("SHADER", script, 1).replace("GIVEN", given, 1)
     found = json.loads(browser.written(page, program))
     for one in (found, *found.get("sources", [])):
         if "error" in one:

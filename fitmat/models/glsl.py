@@ -5,14 +5,23 @@ parts of the same lobe declare, have their own short names; what several lobes s
 """
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import numpy as np
 
+EVERY = "*"
+"""All parameters."""
+
 
 class AbstractShaded(eqx.Module):
-    """What may have a form in GLSL."""
+    """What may have a form in GLSL.
+
+    Attributes:
+        numbers: Parameters, its parts' among them, from which `glsl` makes numbers of its own; `EVERY` for all.
+    """
+
+    numbers: ClassVar[tuple[str, ...]] = ()
 
     def glsl(self) -> str:
         """Declarations in GLSL ES 3.00, the lobe's own function being `vec3 lobe(vec3 wi, vec3 wo)`; "" for none."""

@@ -14,7 +14,7 @@ from fitmat.models.around.exchange import exchange, light_glsl, mirrored
 from fitmat.models.around.face import face_albedo, face_curve
 from fitmat.models.around.layer import Layer
 from fitmat.models.base import AbstractBRDF
-from fitmat.models.glsl import AbstractShaded, table
+from fitmat.models.glsl import EVERY, AbstractShaded, table
 from fitmat.models.lobes.microfacet import Microfacet
 from fitmat.models.parameters import param
 from fitmat.models.terms.distributions import GGX, Isotropic, Masking
@@ -179,6 +179,8 @@ class Varnish(AbstractBRDF):
 
     Example: `fm.model("rough-varnish-over-lambert", kd=0.4, alpha=0.05, depth=0.1)`
     """
+
+    numbers: ClassVar[tuple[str, ...]] = (EVERY,)
 
     coat: AbstractCoat
     base: AbstractBRDF

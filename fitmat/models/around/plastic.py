@@ -43,6 +43,7 @@ class Plastic(AbstractLobe):
     """
 
     label: ClassVar[str] = "plastic"
+    numbers: ClassVar[tuple[str, ...]] = ("alpha", "eta")
 
     ks: Scalar = param(
         0.0, 10.0, symbol="k_s", weight=True, default=1.0, doc="specular weight; 1 for a bare dielectric"

@@ -44,6 +44,7 @@ class KullaConty(AbstractSpecular):
     """
 
     label: ClassVar[str] = "{distribution.label}-kc{fresnel.suffix}"
+    numbers: ClassVar[tuple[str, ...]] = ("alpha", "eta", "f0", "f82", "kappa")
 
     ks: Spectrum = specular_weight()
     roughness: Isotropic = eqx.field(default_factory=Isotropic)

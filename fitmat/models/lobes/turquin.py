@@ -44,6 +44,7 @@ class Turquin(AbstractSpecular):
     """
 
     label: ClassVar[str] = "{distribution.label}-turquin{fresnel.suffix}"
+    numbers: ClassVar[tuple[str, ...]] = ("alpha", "eta", "f0", "f82", "kappa")
     breaks: ClassVar[Mapping[str, str]] = MappingProxyType(
         {
             "reciprocal": "its factor is that of the viewer's direction alone",

@@ -58,6 +58,7 @@ class Belcour(AbstractFresnel):
     """
 
     suffix: ClassVar[str] = "-belcour"
+    numbers: ClassVar[tuple[str, ...]] = ("eta", "kappa")
     eta: Spectrum = param(
         0.01, 50.0, symbol="η", scale="log", per_channel=True, starts=(0.2, 1.0, 2.5), default=1.0,
         doc="real part of the index of refraction; gold 0.2 (red), aluminium 1, iron 2.9, glass 1.5",
