@@ -306,12 +306,14 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
     ),
     "load": ({"folder": "/proc/x"}, {"folder": PATH}),
     "export": (
-        {"material": LAMBERT},
+        {"material": LAMBERT, "target": "table"},
         {
             "material": without(NOUN, AbstractBRDF, fm.Fit),
             "target": (None, *TEXT, "hlsl"),
             "folder": without(PATH, NOTHING),
             **dict.fromkeys(("model", "name"), TEXT),
+            "theta_i": (5, b"x", [], 1j, FIT, np.nan),
+            "step": (*TEXT, 5.0, 0.0),
             **dict.fromkeys(("strict", "verify", "force"), FLAG),
         },
     ),

@@ -15,7 +15,9 @@ from fitmat.cli.flags.export import (
     OneModelFlag,
     ReplaceExportFlag,
     ResultFlag,
+    StepFlag,
     StrictFlag,
+    TableThetaIFlag,
     TargetFlag,
 )
 from fitmat.cli.flags.files import (
@@ -221,6 +223,8 @@ def export(
     out: ExportOutFlag = None,
     model: OneModelFlag = None,
     name: MaterialNameFlag = None,
+    theta_i: TableThetaIFlag = None,
+    step: StepFlag = None,
     strict: StrictFlag = False,
     no_verify: NoVerifyFlag = False,
     force: ReplaceExportFlag = False,
@@ -230,7 +234,8 @@ def export(
     from fitmat.cli import export
 
     options = {"strict": strict, "verify": not no_verify, "force": force}
-    process.say(str(export.written(result, to, out, model, name, **options)))
+    options |= {"model": model, "name": name} | export.grid(theta_i, step)
+    process.say(str(export.written(result, to, out, **options)))
 
 
 @app.command(cls=Command)

@@ -4,29 +4,34 @@ It translates nothing itself.
 """
 
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from fitmat import files
+from fitmat.cli.angles import angles
 from fitmat.exports.export import Export, export
 from fitmat.studies.result import RECORD, load
 
 
-def written(
-    run: Path, target: str, folder: Path | None, model: str | None, name: str | None, **options: bool
-) -> Export:
+def written(run: Path, target: str, folder: Path | None, **options: Any) -> Export:
     """Load a run and export one of its models.
 
     Args:
         run: A run's folder, or its record.
         target: As `fitmat.export`.
         folder: Where to; None for one beside the run, with its name and the target's.
-        model: Which model; None for the one that the data prefer.
-        name: Of the material.
-        **options: strict, verify and force, as `fitmat.export`.
+        **options: As `fitmat.export`.
 
     Raises:
         FitmatError: as `fitmat.load` and `fitmat.export`.
     """
     result = load(run)
     place = run.parent if run.name == RECORD else run
-    target_folder = folder or files.default(place.resolve(), target)
-    return export(result, target, target_folder, model=model, name=name, **options)
+    return export(result, target, folder or files.default(place.resolve(), target), **options)
+
+
+def grid(theta_i: str | None, step: float | None) -> dict[str, Any]:
+    """The angles of a table in radians; errors as `angles`."""
+    light = None if theta_i is None else np.deg2rad(angles(theta_i, "--theta-i", lowest=0.0))
+    return {"theta_i": light, "step": None if step is None else float(np.deg2rad(step))}

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fitmat.cli.angles import angles
 from fitmat.errors import ModelError, OutputError
 from fitmat.files import write_text
 from fitmat.measurements.formats import csv
@@ -17,42 +18,8 @@ from fitmat.models.base import AbstractBRDF, AbstractEstimated
 from fitmat.models.parameters import assignments
 from fitmat.models.registry import model
 
-MOST_ANGLES = 10_000
-"""More angles than this on one axis are a slip of the keyboard."""
-
-
 SAMPLES = 4096
 """Paths for each geometry of a model that is estimated, where the user gives no number."""
-
-
-def angles(text: str, option: str, *, lowest: float = -90.0, highest: float = 90.0) -> np.ndarray:
-    """`FIRST:LAST:STEP` or a comma-separated list, in degrees.
-
-    Args:
-        text: What the user gave.
-        option: Its name, for messages.
-        lowest: Smallest angle allowed, degrees; −90 itself is not.
-        highest: The angles stay below it.
-
-    Raises:
-        ModelError: the text is neither, there are too many angles, or one is outside `lowest` to `highest`.
-    """
-    try:
-        if ":" in text:
-            first, last, step = (float(part) for part in text.split(":"))
-            count = (last - first) / step + 1.5 if step > 0 else 0.0
-            found = first + step * np.arange(int(min(max(count, 0.0), MOST_ANGLES + 1)))
-        else:
-            found = np.array([float(part) for part in text.split(",")])
-    except ValueError as error:
-        raise ModelError(f"{option} {text!r}: expected a list 10,30,60 or FIRST:LAST:STEP in degrees.") from error
-    if found.size > MOST_ANGLES:
-        raise ModelError(f"{option} {text!r}: expected at most {MOST_ANGLES} angles; take a larger step.")
-    if found.size == 0 or not ((found >= lowest) & (found > -90) & (found < highest)).all():
-        raise ModelError(
-            f"{option} {text!r}: expected angles from {lowest:g} to below {highest:g} degrees, in rising order."
-        )
-    return found
 
 
 def grid(theta_i: str, theta_o: str, phi: str, phi_i: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

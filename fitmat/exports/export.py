@@ -7,51 +7,22 @@ import dataclasses
 import json
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import Any
 
 import numpy as np
+from jaxtyping import ArrayLike
 
 from fitmat import arguments, files
 from fitmat.errors import ModelError, OutputError
-from fitmat.exports import mitsuba, shaders, translation, verification
+from fitmat.exports.material import Chosen, Material, chosen
+from fitmat.exports.targets import TARGETS, Target
 from fitmat.exports.verification import TOLERANCE, Difference
-from fitmat.models.around.shown import surface
-from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import entries, vector
-from fitmat.studies.result import Result
 from fitmat.text import brief, plain
 from fitmat.uncertainty.estimate import Quantity
-
-if TYPE_CHECKING:
-    from fitmat.fitting.result import Fit
-    from fitmat.studies.study import Study
-
-
-class Target(NamedTuple):
-    """A renderer, or a language of renderers.
-
-    Attributes:
-        title: What it is, with its version.
-        translate: Model → its form there.
-        texts: Name of the files, header lines, form → file names and texts.
-        difference: Model, form → how far its values there are; None where nothing runs it.
-    """
-
-    title: str
-    translate: Callable[[AbstractBRDF], Any]
-    texts: Callable[[str, Sequence[str], Any], dict[str, str]]
-    difference: Callable[[AbstractBRDF, Any], Difference | None]
-    notes: Callable[[AbstractBRDF], Sequence[str]]
-
-
-TARGETS = {
-    "glsl": Target("GLSL ES 3.00", translation.translated, shaders.texts, verification.difference, lambda _: ()),
-    "mitsuba": Target("Mitsuba 3", mitsuba.translated, mitsuba.texts, mitsuba.difference, mitsuba.notes),
-}
-"""Targets by name."""
 
 RECORD = "export.json"
 
@@ -61,8 +32,6 @@ FORMAT = 1
 LONGEST = 80
 """Characters of a name that files get."""
 
-Material: TypeAlias = "AbstractBRDF | Fit | Study | Result"
-
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Export:
@@ -71,7 +40,7 @@ class Export:
     Attributes:
         target: Key of `TARGETS`.
         model: The model's name.
-        files: File names → texts, last the record.
+        files: File names → their contents, bytes where they are no text; last the record.
         difference: From the model, where it was run.
         notes: In which conventions the target differs from the model, as sentences.
         folder: Where the files are, if they were written.
@@ -79,7 +48,7 @@ class Export:
 
     target: str
     model: str
-    files: Mapping[str, str]
+    files: Mapping[str, Any]
     difference: Difference | None
     notes: tuple[str, ...] = ()
     folder: Path | None = None
@@ -95,19 +64,8 @@ class Export:
         ]
         if self.difference is not None and self.difference.beyond:
             lines.append(f"{self.difference.beyond} directions are further apart than {TOLERANCE:g}.")
+        lines[1:1] = self.notes
         return "\n".join(lines)
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Chosen:
-    """What is exported: a model's material, where it comes from, and its intervals where there are any."""
-
-    model: AbstractBRDF
-    source: str
-    channels: tuple[str, ...]
-    parameters: tuple[Quantity, ...]
-
-    __repr__ = brief
 
 
 def export(
@@ -117,6 +75,8 @@ def export(
     *,
     model: str | None = None,
     name: str | None = None,
+    theta_i: ArrayLike | None = None,
+    step: float | None = None,
     strict: bool = False,
     verify: bool = True,
     force: bool = False,
@@ -125,16 +85,20 @@ def export(
 
     GLSL: `NAME.glsl` holds the function `vec3 brdf(vec3 wi, vec3 wo)` to paste; `NAME.vert` and `NAME.frag` light with
     it (uniforms mvpMatrix, mvMatrix, source, emission; attributes position at 0 and normal at 2). Mitsuba: `NAME.py`
-    holds the dictionary, `NAME.xml` the same as a scene to include. `export.json` holds the values and the difference.
+    holds the dictionary, `NAME.xml` the same as a scene to include. A table: `NAME.csv`, `NAME.parquet` and
+    `NAME.json`, the values at a goniometer's angles. MERL: `NAME.binary`. `export.json` holds the values and the
+    difference.
     What the instrument and a tilted mount did is not part of the material.
 
     Args:
         material: A model, a fit, a study, or the result of one from `fitmat.load`.
-        target: "glsl" or "mitsuba".
+        target: "glsl", "mitsuba", "table" or "merl".
         folder: Where to; it appears complete or not at all. None to write nothing.
         model: Which model of a study; None for the one that the data prefer.
         name: Of the material, and of the files; None for that of the measurements, or of the model.
-        strict: Whether to refuse where the target has another convention than the model, instead of saying so.
+        theta_i: Zenith angles of incidence of a table in radians, (k,); None for those of reflection.
+        step: Between its angles of reflection and between azimuths, radians; None for 5°, 15° of anisotropic materials.
+        strict: Whether to refuse where the target differs from the model, instead of saying so.
         verify: Whether to run it, in Chromium or in Mitsuba, where there is one.
         force: Replace the files of an earlier export in the folder.
 
@@ -154,16 +118,19 @@ def export(
     for key, text in (("model", model), ("name", name)):
         arguments.kind(key, text, str, optional=True)
     arguments.flags(strict=strict, verify=verify, force=force)
-    chosen = _chosen(material, model)
-    if strict and (different := TARGETS[target].notes(chosen.model)):
-        raise ModelError(f"{different[0]} Leave out strict to export it all the same.")
-    called = name if name is not None else chosen.source or chosen.model.name
+    grid = {key: value for key, value in {"theta_i": theta_i, "step": step}.items() if value is not None}
+    if grid and not TARGETS[target].gridded:
+        gridded = ", ".join(key for key, one in TARGETS.items() if one.gridded)
+        raise ModelError(f"{next(iter(grid))} with target {target!r}, expected it with {gridded} only. Leave it out.")
+    what = chosen(material, model)
+    called = name if name is not None else what.source or what.model.name
+    options = {"strict": strict, "verify": verify}
     if folder is None:
-        return _made(chosen, target, called, verify=verify)
+        return _made(what, target, called, grid, **options)
     with files.new(Path(folder), own=own, force=force) as draft:
-        made = _made(chosen, target, called, verify=verify)
-        for file, text in made.files.items():
-            (draft / file).write_text(text, encoding="utf-8")
+        made = _made(what, target, called, grid, **options)
+        for file, content in made.files.items():
+            (draft / file).write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
     return dataclasses.replace(made, folder=Path(folder))
 
 
@@ -188,60 +155,33 @@ def file_name(name: str) -> str:
     return kept or "material"
 
 
-def _chosen(material: Material, name: str | None) -> Chosen:
-    if isinstance(material, Result):
-        one = material.fitted(name)
-        return Chosen(surface(one.model), material.source, one.channels, one.parameters)
-    if not isinstance(material, AbstractBRDF):
-        return _of_study(material, name)
-    if name is not None:
-        raise ModelError(f"model {name!r} beside one model, expected it with a study or a result. Leave it out.")
-    return Chosen(surface(material), "", (), ())
-
-
-def _of_study(material: "Fit | Study", name: str | None) -> Chosen:
-    """A model of a study, or a fit; what makes these is loaded only where somebody has one."""
-    from fitmat.fitting.result import Fit
-    from fitmat.studies.study import Study
-
-    arguments.kind("material", material, AbstractBRDF, Fit, Study, Result)
-    if isinstance(material, Study):
-        named = {found.name: found for found in material.findings}
-        best = material.choice.best.name if material.choice is not None else None
-        wanted = name or best or (next(iter(named)) if len(named) == 1 else None)
-        if wanted not in named:
-            raise ModelError(f"model is {wanted!r}, expected one of the study: {', '.join(named)}.")
-        fit, parameters = named[wanted].fit, named[wanted].parameters
-    else:
-        fit, parameters = material, ()
-        if name not in (None, fit.name):
-            raise ModelError(f"model is {name!r}, expected that of the fit, {fit.name}. Leave it out.")
-    return Chosen(surface(fit.model), fit.measurements.source, fit.measurements.channels, parameters)
-
-
-def _made(chosen: Chosen, target: str, name: str, *, verify: bool) -> Export:
+def _made(chosen: Chosen, target: str, name: str, grid: Mapping[str, Any], *, strict: bool, verify: bool) -> Export:
     made = TARGETS[target]
-    form = made.translate(chosen.model)
-    found = made.difference(chosen.model, form) if verify else None
+    form = made.translate(chosen, **grid)
+    notes = tuple(made.notes(chosen, form))
+    if strict and notes:
+        raise ModelError(f"{notes[0]} Leave out strict to export it all the same.")
+    found = made.difference(chosen, form) if verify else None
     called = file_name(Path(name).stem if name == chosen.source else name)
-    texts = made.texts(called, _header(chosen, target, name, found), form)
-    record = plain(_record(chosen, target, name, list(texts), found))
-    texts[RECORD] = json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    return Export(target, chosen.model.name, texts, found, tuple(made.notes(chosen.model)))
+    header = [*_header(chosen, made, name), *notes, *_executed(found).split("\n")]
+    contents = dict(made.texts(called, header, form))
+    record = _record(chosen, target, name) | dict(made.facts(form))
+    record |= {"files": list(contents), "notes": list(notes)}
+    record |= {"executed": None if found is None else dataclasses.asdict(found)}
+    contents[RECORD] = json.dumps(plain(record), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    return Export(target, chosen.model.name, contents, found, notes)
 
 
-def _header(chosen: Chosen, target: str, name: str, found: Difference | None) -> list[str]:
+def _header(chosen: Chosen, made: Target, name: str) -> list[str]:
     """Lines of ASCII; names are quoted as JSON writes them, which ends no comment and no line."""
-    lines = [f"{json.dumps(name)}: {chosen.model.name}, {TARGETS[target].title}, by fitmat {version('fitmat')}."]
+    lines = [f"{json.dumps(name)}: {chosen.model.name}, {made.title}, by fitmat {version('fitmat')}."]
     if chosen.source:
         lines.append(f"Fitted to {json.dumps(chosen.source)}.")
     if len(chosen.channels) == 3:
         lines.append(f"Red, green and blue are the channels {', '.join(map(json.dumps, chosen.channels))}.")
     of_model = {entry.name for entry in entries(chosen.model)}
     known = [words for q in chosen.parameters if q.name in of_model for words in _interval(q)]
-    if known:
-        lines += ["95 % intervals:", *(f"  {words}" for words in known)]
-    return [*lines, *TARGETS[target].notes(chosen.model), *_executed(found).split("\n")]
+    return lines + (["95 % intervals:", *(f"  {words}" for words in known)] if known else [])
 
 
 def _interval(q: Quantity) -> list[str]:
@@ -253,7 +193,7 @@ def _executed(found: Difference | None) -> str:
     return "Not executed here." if found is None else found.words
 
 
-def _record(chosen: Chosen, target: str, name: str, names: Sequence[str], found: Difference | None) -> dict[str, Any]:
+def _record(chosen: Chosen, target: str, name: str) -> dict[str, Any]:
     values = np.asarray(vector(chosen.model))
     return {
         "format": FORMAT,
@@ -265,7 +205,4 @@ def _record(chosen: Chosen, target: str, name: str, names: Sequence[str], found:
         "model": chosen.model.name,
         "channels": list(chosen.channels),
         "values": {e.name: values[e.place] if e.shape else values[e.place][0] for e in entries(chosen.model)},
-        "files": list(names),
-        "notes": list(TARGETS[target].notes(chosen.model)),
-        "executed": None if found is None else dataclasses.asdict(found),
     }

@@ -52,6 +52,7 @@ class Difference:
         count: Pairs of directions.
         beyond: How many of them are further apart than `TOLERANCE`.
         executor: Program and version.
+        over: Which directions these are.
     """
 
     largest: float
@@ -62,6 +63,7 @@ class Difference:
     count: int
     beyond: int
     executor: str
+    over: str = "grazing and mirror peak included"
 
     __repr__ = brief
 
@@ -70,7 +72,7 @@ class Difference:
         """The same in two sentences, each on a line."""
         place = f"theta_i {self.theta_i_deg:.1f}, theta_o {self.theta_o_deg:.1f}, phi {self.phi_deg:.0f} degrees"
         return (
-            f"Executed in {self.executor} over {self.count} directions, grazing and mirror peak included.\n"
+            f"Executed in {self.executor} over {self.count} directions, {self.over}.\n"
             f"Relative difference from the model at most {self.largest:.1e} ({place}), {self.mean:.1e} on average."
         )
 

@@ -103,14 +103,14 @@ def test_what_stands_there_is_replaced_when_asked_and_only_if_it_is_an_exports(t
 
 
 def test_a_disk_that_fills_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    write, count = Path.write_text, iter(range(10))
+    write, count = Path.write_bytes, iter(range(10))
 
     def full(self: Path, *arguments: Any, **options: Any) -> int:
         if next(count) == 2:
             raise OSError(28, "No space left on device")
         return write(self, *arguments, **options)
 
-    monkeypatch.setattr(Path, "write_text", full)
+    monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(OutputError, match="No space left on device"):
         fm.export(LAMBERT, "glsl", tmp_path / "out")
     assert os.listdir(tmp_path) == []
@@ -136,7 +136,11 @@ def test_what_is_found_is_said_everywhere(tmp_path: Path, monkeypatch: pytest.Mo
             lambda r: fm.export(fm.load(r), model="ggx"),
             r"no values of ggx, expected one of its models; it has lambert\+p",
         ),
-        (lambda r: fm.export(LAMBERT, "hlsl"), "target is the text 'hlsl', expected 'glsl' or 'mitsuba'"),
+        (
+            lambda r: fm.export(LAMBERT, step=0.1),
+            "step with target 'glsl', expected it with table only",
+        ),
+        (lambda r: fm.export(LAMBERT, "hlsl"), "target is the text 'hlsl', expected 'glsl' or 'mit"),
     ],
 )
 def test_what_is_not_there_is_refused(result: Path, call: Any, sentence: str) -> None:

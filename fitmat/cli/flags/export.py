@@ -10,7 +10,27 @@ import typer
 
 ResultFlag = Annotated[Path, typer.Argument(help="Folder of a run of fitmat fit, or the fit.json in it.")]
 
-TargetFlag = Annotated[str, typer.Option("--to", help="What it is written for: glsl or mitsuba.", metavar="TARGET")]
+TargetFlag = Annotated[
+    str, typer.Option("--to", help="What it is written for: glsl, mitsuba, table or merl.", metavar="TARGET")
+]
+
+TableThetaIFlag = Annotated[
+    str | None,
+    typer.Option(
+        "--theta-i",
+        help="Incidences of a table in degrees, 10,30,60 or FIRST:LAST:STEP; default those of reflection.",
+        show_default=False,
+    ),
+]
+
+StepFlag = Annotated[
+    float | None,
+    typer.Option(
+        "--step",
+        help="Degrees between a table's angles of reflection, and its azimuths; default 5, 15 if anisotropic.",
+        show_default=False,
+    ),
+]
 
 ExportOutFlag = Annotated[
     Path | None,
@@ -33,13 +53,13 @@ MaterialNameFlag = Annotated[
 ]
 
 StrictFlag = Annotated[
-    bool, typer.Option("--strict", help="Refuse where the target has another convention than the model; else say so.")
+    bool, typer.Option("--strict", help="Refuse where the target differs from the model; else say so.")
 ]
 
 NoVerifyFlag = Annotated[
     bool,
     typer.Option(
-        "--no-verify", help="Do not run what was written; else Chromium, or Mitsuba, runs it where there is one."
+        "--no-verify", help="Do not run what was written; else what reads or runs it there does, where there is one."
     ),
 ]
 

@@ -67,7 +67,7 @@ def load(path: str | os.PathLike[str]) -> Recording:
     with np.errstate(invalid="ignore"):  # NaNs may be of the signalling kind
         value = planes * SCALE[:, None]
     turn = 2 if shape[2] == 4 * shape[1] else 1
-    wi, wo = _centres(shape, turn * np.pi)
+    wi, wo = centres(shape, turn * np.pi)
     return Recording(
         source=source,
         wi=wi,
@@ -132,8 +132,12 @@ def _conventions(shape: tuple[int, int, int], turn: int) -> tuple[str, ...]:
     return (centres, f"MERL grid of {shape[0]} × {shape[1]} × {shape[2]} cells: φ_d taken to cover {span}.")
 
 
-def _centres(shape: tuple[int, int, int], span: float) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
-    r"""Directions of all cells, light turned to azimuth 0; sines are taken along the axes of the grid only.
+def centres(
+    shape: tuple[int, int, int] = SHAPE, span: float = np.pi
+) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
+    r"""Directions of all cells in the order of the file, light turned to azimuth 0.
+
+    Sines are taken along the axes of the grid only.
 
     With h = (sin θ_h, 0, cos θ_h) and d = (sin θ_d cos φ_d, sin θ_d sin φ_d, cos θ_d), Rusinkiewicz's definition gives
 
@@ -155,10 +159,10 @@ def _centres(shape: tuple[int, int, int], span: float) -> tuple[Float[np.ndarray
     return wi.reshape(3, -1).T, wo.reshape(3, -1).T
 
 
-def _cells(
+def cells(
     wi: Float[np.ndarray, "n 3"], wo: Float[np.ndarray, "n 3"]
 ) -> tuple[Int[np.ndarray, " n"], Bool[np.ndarray, " n"]]:
-    """The cell of each pair of directions, and whether it lies off the centre of it."""
+    """The cell of each pair of directions of a file of `SHAPE`, and whether it lies off the centre of it."""
     half, aside = wi + wo, wi - wo
     level = np.hypot(half[:, 0], half[:, 1])
     theta_h = np.arctan2(level, half[:, 2])
@@ -182,7 +186,7 @@ def _gridded(measurements: Measurements) -> _Grid:
         remedy = "Write .csv or .parquet, or select the channels first."
         raise OutputError(f"MERL files hold r, g and b, got {channels} channels, expected 1 or 3. {remedy}")
     used = np.flatnonzero(measurements.valid.any(axis=1))
-    cell, off = _cells(measurements.wi[used], measurements.wo[used])
+    cell, off = cells(measurements.wi[used], measurements.wo[used])
     size = SHAPE[0] * SHAPE[1] * SHAPE[2]
     count, total = np.zeros((size, channels), int), np.zeros((size, channels))
     for k in range(channels):
