@@ -48,9 +48,11 @@ LABS = (
 
 EXPORT = (
     "Written to --out for glsl: NAME.glsl, the function vec3 brdf(vec3 wi, vec3 wo) to paste; NAME.vert and NAME.frag, "
-    "which light with it; for mitsuba: NAME.py, the dictionary, and NAME.xml, a scene to include. With them "
-    "export.json, the values and how far the target's are from the model's.\n\n"
+    "which light with it; for mitsuba: NAME.py, the dictionary, and NAME.xml, a scene to include; for table: "
+    "NAME.csv, NAME.parquet and NAME.json; for merl: NAME.binary. With them export.json, the values and how far "
+    "the target's are from the model's.\n\n"
     "Examples:\n\n"
     "  fitmat export run1 --to glsl\n\n"
-    "  fitmat export run1 --to mitsuba --model lambert+ggx --name 'satin plastic' --out mine"
+    "  fitmat export run1 --to mitsuba --model lambert+ggx --name 'satin plastic' --out mine\n\n"
+    "  fitmat export run1 --to table --theta-i 10,30,60 --step 2"
 )
