@@ -1,3 +1,5 @@
+__version__: str
+
 # Measurements
 from .measurements.reader import read as read
 from .measurements.joining import join as join
@@ -11,6 +13,7 @@ from .models.simulation import simulate as simulate
 # Models
 from .models.registry import model as model
 from .judgement.choice import every_model as every_model
+from .maths.directions import directions as directions
 from .models.base import evaluate as evaluate
 from .models.albedo import albedo as albedo
 from .models.multiple_scattering.surface import Surface as Surface

@@ -73,6 +73,9 @@ def without(values: tuple[Any, ...], *classes: type) -> tuple[Any, ...]:
     return tuple(value for value in values if not isinstance(value, classes))
 
 
+NO_FILE = without(NOUN, fm.Measurements, str, Path)
+"""What is neither measurements nor the name of a file."""
+
 NOTHING = type(None)
 VALUES: dict[str, Any] = {"relative_noise": 0.1, "absolute_noise": 0.0, "seed": 1}
 KNOWN: dict[str, tuple[Any, ...]] = {"fixed": (*NAMED, {"kd": "x"}), "priors": (*NAMED, {"kd": 5}, {"kd": (1, "x")})}
@@ -125,7 +128,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             "dark": without(NUMBER, NOTHING),
         },
     ),
-    "examine": ({"measurements": MEASURED}, {"measurements": without(NOUN, fm.Measurements)}),
+    "examine": ({"measurements": MEASURED}, {"measurements": NO_FILE}),
     "simulate": (
         {"truth": LAMBERT, "theta_i": 0.5, "theta_o": 0.5, **VALUES},
         {
@@ -148,6 +151,10 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
         },
     ),
     "every_model": ({}, {"measurements": without(NOUN, fm.Measurements, NOTHING)}),
+    "directions": (
+        {"theta": 0.5},
+        {"theta": (*NUMBERS, 2.0, np.zeros((2, 2))), "phi": (*NUMBERS, 7.0, np.zeros((2, 2))), "degrees": FLAG},
+    ),
     "evaluate": (
         {"model": LAMBERT, "wi": UP, "wo": UP},
         {
@@ -211,7 +218,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
     "fit": (
         {"measurements": MEASURED, "to": "lambert"},
         {
-            "measurements": without(NOUN, fm.Measurements),
+            "measurements": NO_FILE,
             "to": (None, "lambort", 5, [], MEASURED),
             **KNOWN,
             "loss": (None, *TEXT, "lost"),
@@ -278,7 +285,11 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
     ),
     "compare": (
         {"one": POSTERIOR, "other": POSTERIOR},
-        {"one": NOUN, "other": NOUN, **dict.fromkeys(("spheres", "imitations", "pictures"), FLAG)},
+        {
+            "one": without(NOUN, fm.Fit),
+            "other": without(NOUN, fm.Fit),
+            **dict.fromkeys(("spheres", "imitations", "pictures"), FLAG),
+        },
     ),
     "imitate": (
         {"what": LAMBERT, "into": "lambert"},
@@ -292,7 +303,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
     "study": (
         {"measurements": MEASURED, "models": "lambert"},
         {
-            "measurements": without(NOUN, fm.Measurements),
+            "measurements": NO_FILE,
             "models": (None, 5, 1j, [], [5], "lambort", FIT),
             **KNOWN,
             "loss": (None, *TEXT, "lost"),

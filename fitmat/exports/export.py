@@ -20,9 +20,9 @@ from fitmat.errors import ModelError, OutputError
 from fitmat.exports.material import Chosen, Material, chosen
 from fitmat.exports.targets import TARGETS, Target
 from fitmat.exports.verification import TOLERANCE, Difference
+from fitmat.fitting.quantities import Quantity
 from fitmat.models.parameters import entries, vector
 from fitmat.text import brief, plain
-from fitmat.uncertainty.estimate import Quantity
 
 RECORD = "export.json"
 

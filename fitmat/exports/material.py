@@ -12,12 +12,12 @@ from jaxtyping import Float
 
 from fitmat import arguments
 from fitmat.errors import ModelError, ReadError
+from fitmat.fitting.quantities import Quantity
 from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.values import surfaces
 from fitmat.studies.result import Result
 from fitmat.text import brief
-from fitmat.uncertainty.estimate import Quantity
 
 if TYPE_CHECKING:
     from fitmat.fitting.result import Fit

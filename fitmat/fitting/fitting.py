@@ -3,6 +3,7 @@
 Gives the best parameters, how sure the data are of them locally (covariance), and what to think of the result.
 """
 
+import os
 from collections.abc import Mapping
 
 import jax
@@ -11,6 +12,7 @@ from jaxtyping import ArrayLike
 
 from fitmat import arguments
 from fitmat.errors import FitmatError, ModelError
+from fitmat.fitting.concluding import conclude
 from fitmat.fitting.coordinates import Coordinates, coordinates
 from fitmat.fitting.ends import Ends, behind
 from fitmat.fitting.jitter import AGAIN, jittered
@@ -19,10 +21,11 @@ from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.losses import loss as find_loss
 from fitmat.fitting.priors import prepare_prior, refuse_idle
 from fitmat.fitting.refining import MAX_STEPS, ROUNDS, STARTS, confirmed, optima
-from fitmat.fitting.result import Fit, conclude
+from fitmat.fitting.result import Fit
 from fitmat.fitting.seeing import seen
 from fitmat.fitting.starts import starting_points
 from fitmat.measurements.noise import measured_noise
+from fitmat.measurements.reader import measurements_of
 from fitmat.measurements.samples import Measurements
 from fitmat.models.around.noise import LEAST_ABSOLUTE, Noisy
 from fitmat.models.base import AbstractBRDF
@@ -31,7 +34,7 @@ from fitmat.models.registry import model
 
 
 def fit(
-    measurements: Measurements,
+    measurements: Measurements | str | os.PathLike[str],
     to: str | AbstractBRDF,
     *,
     fixed: Mapping[str, ArrayLike] | None = None,
@@ -43,7 +46,7 @@ def fit(
     """Fit a model to measurements.
 
     Args:
-        measurements: From `fitmat.read`.
+        measurements: From `fitmat.read`, or a file that needs no options.
         to: A model name ("lambert+ggx"), or a model whose shapes and static choices are used.
         fixed: Parameters to hold, by name: `{"ks": 1.0}`.
         priors: What is known beforehand, by name: centre and standard deviation, `{"eta": (1.5, 0.05)}`; see
@@ -66,8 +69,10 @@ def fit(
         raise FitmatError(
             'fitmat needs 64-bit floats: run jax.config.update("jax_enable_x64", True) before building arrays.'
         )
-    _refuse_kinds(measurements, to, fixed, priors)
+    arguments.kind("to", to, str, AbstractBRDF)
+    arguments.named(fixed=fixed, priors=priors)
     arguments.whole("max_steps", max_steps, 1)
+    measurements = measurements_of(measurements)
     channels = len(measurements.channels)
     if masking is not None and not isinstance(to, str):
         raise ModelError(
@@ -119,12 +124,6 @@ def _with_jitter(
         found = jittered(data, with_vector(shown, ends.values[order[0]]), told, signed=bool(m.in_plane.all()))
         ends = optima(shown, found, ends.values[order], moved, max_steps)
     return found, ends
-
-
-def _refuse_kinds(measurements: object, to: object, fixed: object, priors: object) -> None:
-    arguments.kind("measurements", measurements, Measurements)
-    arguments.kind("to", to, str, AbstractBRDF)
-    arguments.named(fixed=fixed, priors=priors)
 
 
 def _noise_priors(m: Measurements) -> dict[str, tuple[ArrayLike, ArrayLike]]:

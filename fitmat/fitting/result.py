@@ -1,4 +1,4 @@
-"""What a fit found: the noun `Fit`, its covariance, and the name of its outcome.
+"""What a fit found: the noun `Fit`, its covariance and its parameters as people read them.
 
 Finds nothing itself; `fitting` does.
 """
@@ -6,38 +6,25 @@ Finds nothing itself; `fitting` does.
 import dataclasses
 import functools
 import math
+from collections.abc import Collection
 
 import numpy as np
+import polars as pl
 from jaxtyping import Float
 
-from fitmat.fitting.coordinates import Coordinates, coordinates
+from fitmat.fitting.coordinates import Coordinates, channel_names, coordinates
 from fitmat.fitting.correlation import Correlation, correlate
-from fitmat.fitting.ends import AGREE, AS_GOOD, Ends, behind, home
-from fitmat.fitting.information import FOLLOWS, MISSES, covariance, information, inverse_information
-from fitmat.fitting.likelihood import Data, best_discrepancy, first_discrepancy
+from fitmat.fitting.information import FOLLOWS, MISSES, inverse_information
+from fitmat.fitting.likelihood import Data
 from fitmat.fitting.linear import Linear, linearise
-from fitmat.fitting.losses import DEFAULT, Loss
-from fitmat.fitting.symmetries import nearest
+from fitmat.fitting.losses import Loss
+from fitmat.fitting.quantities import SEVERAL, UNDETERMINED, Quantity, dataframe, named
 from fitmat.maths.normal import Z95
-from fitmat.maths.programs import program
 from fitmat.measurements.noise import Noise
 from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF
-from fitmat.models.parameters import Entry, entries, vector, with_vector
-from fitmat.models.values import at
+from fitmat.models.parameters import Entry, entries, vector
 from fitmat.text import brief, html_table, text_table, with_error
-
-RESULTS = {
-    "converged": "Converged.",
-    "at_bound": "A parameter sits on its bound: the data ask for a value outside the model's range. "
-    "Its uncertainty is not quoted; consider another model, or fix the parameter.",
-    "unidentifiable": "At least one parameter is not determined by these angles: fix it (for example ks=1), "
-    "or measure at more incidence angles.",
-    "max_steps": "The solver ran out of steps; the numbers are its last iterate. "
-    "Raise max_steps or simplify the model.",
-    "nonfinite": "The likelihood is not finite for any start: check the data for extreme values.",
-}
-"""How a fit can end, and what that means."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -52,7 +39,7 @@ class Fit:
         data: The samples as the likelihood sees them.
         discrepancy: s, the spread of ∛(f cosθ_i) that the model cannot explain, in sr^(−1/3).
         held: Fixed parameters by name.
-        result: Key of `RESULTS`.
+        result: Key of `concluding.RESULTS`.
         steps: Levenberg–Marquardt iterations of the best start.
         n_starts: How many starts were refined.
         n_starts_agreeing: How many of them found the best optimum.
@@ -203,12 +190,27 @@ class Fit:
             return f"follows the data to about the measurement noise (misfit {ratio:.1f} × noise){shared}"
         return f"inadequate: misses the data by {ratio:.0f} × the measurement noise"
 
+    @functools.cached_property
+    def parameters(self) -> tuple[Quantity, ...]:
+        """Every parameter with its standard deviation and 95 % interval, by the curvature at the best fit."""
+        return tuple(quantities(self, *by_curvature(self)))
+
+    def __getitem__(self, name: str) -> Quantity:
+        """One of the `parameters`; `print(fit["alpha"])` says `alpha (α) = 0.15027 ± 0.00040 (95 % 0.1495 – 0.1511)`.
+
+        Raises:
+            ModelError: the model has none of that name.
+        """
+        return named(self.parameters, name, self.name)
+
+    def to_dataframe(self) -> pl.DataFrame:
+        """The parameters as a table, one row for each and each channel."""
+        return dataframe(self.parameters, self.name, self.measurements.channels)
+
     def _rows(self) -> list[tuple[str, str, str]]:
-        sd = np.sqrt(np.diagonal(self.covariance))
-        names = coordinates(self.model, channels=self.measurements.channels).names
-        symbols = [e.param.symbol for e in self.entries for _ in range(e.size)]
-        rows = zip(names, symbols, self.values, sd, strict=True)
-        return [(name, symbol, with_error(float(value), float(error))) for name, symbol, value, error in rows]
+        names = iter(coordinates(self.model, channels=self.measurements.channels).names)
+        each = ((q.symbol, q.value[k], q.sd[k]) for q in self.parameters for k in range(len(q.value)))
+        return [(next(names), symbol, with_error(float(value), float(sd))) for symbol, value, sd in each]
 
     def __str__(self) -> str:
         """The outcome and every parameter with its standard deviation."""
@@ -219,8 +221,8 @@ class Fit:
 
     @property
     def _caption(self) -> str:
-        agreeing = f"{self.n_starts_agreeing} of {self.n_starts} starts agree"
-        return f"{self.name}: {self.result}, {agreeing}; {self.adequacy}."
+        starts = f"{self.n_starts_agreeing} of {self.n_starts} starts agree"
+        return f"{self.name}: {self.result}, {starts}; {self.adequacy}."
 
     @property
     def aicc(self) -> float:
@@ -238,63 +240,62 @@ class Fit:
         return self.n_inferred * np.log(self.n_values) - 2 * self.log_likelihood
 
 
-def conclude(
-    m: Measurements,
-    template: AbstractBRDF,
-    held: dict[str, np.ndarray],
-    given: tuple[Noise, Data],
-    ends: Ends,
-) -> Fit:
-    """Choose the best end, compute the covariance and classify."""
-    found_noise, data = given
-    apart = behind(ends, data)
-    k = int(np.argmin(apart))
-    usable = bool(np.isfinite(apart[k]))
-    moved = coordinates(template, held)
-    values = home(data, moved, ends.values[k])
-    best = with_vector(template, values)
-    s = float(ends.discrepancy[k])
-    on_bound = bool(moved.side(values).any())
-    known = information(best, data, s, moved.index)
-    spread, undetermined = covariance(best, known, moved, data.told(moved.index))
-    others = ends.values[(apart < AS_GOOD) & (np.arange(len(apart)) != k)]
-    return Fit(
-        name=template.name,
-        model=best,
-        measurements=m,
-        noise=found_noise,
-        data=data,
-        discrepancy=s,
-        held=held,
-        result=named_outcome(usable, bool(ends.solved[k]), on_bound, undetermined),
-        steps=int(ends.steps[k]),
-        n_starts=len(apart),
-        n_starts_agreeing=int(np.count_nonzero(apart < AGREE)),
-        log_likelihood=float(ends.log_likelihood[k]),
-        information=known,
-        likelihood_covariance=spread,
-        undetermined=undetermined,
-        n_values=int(np.count_nonzero(data.weight)),
-        misfit=s if data.loss.infers_discrepancy else _misfit(best, data),
-        rivals=nearest(best, others, moved),
-    )
+def by_curvature(fit: Fit) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, "p 2"]]:
+    """Standard deviations and 95 % intervals by Laplace; in the logarithm for parameters whose scale is log.
+
+    Both are NaN where the loss is an objective.
+    """
+    every, v = coordinates(fit.model), fit.values
+    sd = np.sqrt(np.diagonal(fit.covariance))
+    sd = sd if fit.loss.posterior else np.full_like(sd, np.nan)
+    with np.errstate(over="ignore"):
+        ratio = np.exp(Z95 * sd / every.slope(v))
+        low = np.where(every.ratio, v / ratio, v - Z95 * sd)
+        high = np.where(every.ratio, v * ratio, v + Z95 * sd)
+    ends = zip(every.around(every.natural(v)), (every.lower, every.upper), strict=True)
+    least, most = (np.where(every.ratio, bound, seen) for seen, bound in ends)
+    return sd, np.stack([np.maximum(low, least), np.minimum(high, most)], axis=1)
 
 
-def _misfit(best: AbstractBRDF, data: Data) -> float:
-    plain = data.under(DEFAULT)
-    return float(discrepancy_of(at(best, data.wi, data.wo) * data.kappa, plain, first_discrepancy(plain)))
+def quantities(
+    fit: Fit,
+    sd: Float[np.ndarray, " p"],
+    ci95: Float[np.ndarray, "p 2"],
+    undetermined: Collection[str] = (),
+) -> list[Quantity]:
+    """The model's parameters; an interval also holds the optima elsewhere that are as good.
+
+    Args:
+        fit: Their fit.
+        sd: Standard deviations.
+        ci95: Intervals.
+        undetermined: Names of parameters, with their channel where there are several, that are not determined beside
+            those of the fit.
+    """
+    ci95, sure = np.array(ci95), np.where(coordinates(fit.model).side(fit.values) != 0, np.nan, sd)
+    for name, place in zip(fit.coordinates.names, fit.coordinates.places, strict=True):
+        others = fit.elsewhere.get(name, ())
+        ci95[place] = min(ci95[place, 0], *others, np.inf), max(ci95[place, 1], *others, -np.inf)
+        sure[place] = np.nan if others else sure[place]
+    result = []
+    for entry in fit.entries:
+        p, names = entry.param, channel_names(entry, fit.measurements.channels)
+        given = np.full(entry.size, np.nan) if entry.name in fit.held else sure[entry.place]
+        result.append(
+            Quantity(
+                *(entry.name, p.symbol, p.unit, p.doc, fit.values[entry.place], given, ci95[entry.place]),
+                per_channel=bool(entry.shape),
+                remarks=tuple(_remark(fit, entry, name, undetermined) for name in names),
+            )
+        )
+    return result
 
 
-discrepancy_of = program(best_discrepancy)
-"""`best_discrepancy` as a program."""
-
-
-def named_outcome(usable: bool, solved: bool, on_bound: bool, undetermined: tuple[str, ...]) -> str:
-    """The key of `RESULTS` that says how a fit ended."""
-    if not usable:
-        return "nonfinite"
-    if undetermined:
-        return "unidentifiable"
-    if on_bound:
-        return "at_bound"
-    return "converged" if solved else "max_steps"
+def _remark(fit: Fit, entry: Entry, name: str, undetermined: Collection[str]) -> str:
+    if name in undetermined or entry.name in fit.undetermined:
+        return UNDETERMINED
+    if name in fit.elsewhere:
+        return SEVERAL
+    if entry.name in fit.on_bound:
+        return f"at its {fit.on_bound[entry.name]} bound"
+    return "fixed" if entry.name in fit.held else ""

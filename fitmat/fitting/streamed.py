@@ -17,9 +17,10 @@ from jaxtyping import ArrayLike
 from fitmat._types import Progress
 from fitmat.errors import ModelError
 from fitmat.fitting import fitting
+from fitmat.fitting.concluding import named_outcome
 from fitmat.fitting.information import FOLLOWS, covariance, is_positive
 from fitmat.fitting.likelihood import Data
-from fitmat.fitting.result import Fit, named_outcome
+from fitmat.fitting.result import Fit
 from fitmat.fitting.streamed_steps import Range
 from fitmat.fitting.streamed_sums import Sums, block_curvature, block_sums, blocks, prior_sums
 from fitmat.measurements.large.noise import Scatter, scatter

@@ -13,14 +13,14 @@ from jaxtyping import Float
 
 from fitmat.fitting.coordinates import channel_names
 from fitmat.fitting.linear import Linear, around
+from fitmat.fitting.quantities import Quantity
 from fitmat.fitting.result import Fit
 from fitmat.judgement.propagation import coefficients, propagated
 from fitmat.maths.quadrature import lobe_rule
 from fitmat.models.values import surfaces, values, widths
 from fitmat.text import brief, visible, with_error
-from fitmat.uncertainty.estimate import Quantity
+from fitmat.uncertainty.derived import following
 from fitmat.uncertainty.posterior import Posterior
-from fitmat.uncertainty.quantities import following
 
 SOURCES = {
     "readings": "noise of the values",

@@ -27,6 +27,7 @@ from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
 from fitmat.models.registry import LOBES, lobe_names
 from fitmat.text import brief
 from fitmat.uncertainty.estimate import Estimate, band, estimate
+from fitmat.uncertainty.laplace import laplace
 from fitmat.uncertainty.posterior import Posterior
 
 MATCH_DRAWS = 100
@@ -169,13 +170,18 @@ def is_microfacet(name: str) -> bool:
 
 
 def compare(
-    one: Posterior, other: Posterior, *, spheres: bool = True, imitations: bool = False, pictures: bool = False
+    one: Posterior | Fit,
+    other: Posterior | Fit,
+    *,
+    spheres: bool = True,
+    imitations: bool = False,
+    pictures: bool = False,
 ) -> Match:
     """The match between an empirical and a microfacet model, in either order.
 
     Args:
-        one: Posterior (`laplace` or `sample`) of a fit.
-        other: Posterior of the other fit to the same measurements.
+        one: Posterior (`laplace` or `sample`) of a fit; a Fit stands for its Laplace approximation with seed 0.
+        other: That of the other fit to the same measurements.
         spheres: Whether to ask what an eye would see of the difference.
         imitations: Whether to ask for the parameters with which each of the two best imitates the other.
         pictures: Whether to make pictures of the spheres.
@@ -187,13 +193,15 @@ def compare(
         FitmatError: the two are not one empirical and one microfacet model, were fitted to different data, or are not
             finite.
     """
-    arguments.kind("one", one, Posterior)
-    arguments.kind("other", other, Posterior)
+    arguments.kind("one", one, Posterior, Fit)
+    arguments.kind("other", other, Posterior, Fit)
     arguments.flags(spheres=spheres, imitations=imitations, pictures=pictures)
     if pictures and not spheres:
         raise FitmatError("pictures without spheres, expected spheres = True: they are what is drawn. Leave one out.")
-    empirical, microfacet = (one, other) if is_empirical(one.fit.name) else (other, one)
-    _refuse_unlike(empirical, microfacet)
+    both = [given if isinstance(given, Fit) else given.fit for given in (one, other)]
+    _refuse_unlike(*both)
+    first, second = (laplace(given, seed=0) if isinstance(given, Fit) else given for given in (one, other))
+    empirical, microfacet = (first, second) if is_empirical(both[0].name) else (second, first)
     fits, models = (empirical.fit, microfacet.fit), (empirical.fit.model, microfacet.fit.model)
     draws, m = paired_draws(empirical, microfacet), fits[0].measurements
     every = incidences(m.wi, np.any(m.valid, axis=1), MOST_INCIDENCES)
@@ -215,8 +223,8 @@ def _imitated(what: Fit, by: Fit) -> list[Imitation]:
     return [imitate(what, by.model, metric) for metric in IMITATED]
 
 
-def _refuse_unlike(empirical: Posterior, microfacet: Posterior) -> None:
-    one, other = empirical.fit, microfacet.fit
+def _refuse_unlike(*fits: Fit) -> None:
+    one, other = fits if is_empirical(fits[0].name) else fits[::-1]
     if not (is_empirical(one.name) and is_microfacet(other.name)):
         known = ", ".join(name for name, lobe in LOBES.items() if lobe.kind == "empirical")
         raise FitmatError(
@@ -225,8 +233,11 @@ def _refuse_unlike(empirical: Posterior, microfacet: Posterior) -> None:
     for fit in (one, other):
         if not fit.finite:
             raise FitmatError(f"{fit.name}: the fit ended {fit.result}, there is nothing to compare; check the data.")
-    if one.measurements is not other.measurements:
-        raise FitmatError("compare needs two fits to the same Measurements object.")
+    first, second = one.measurements, other.measurements
+    same = all(np.array_equal(getattr(first, name), getattr(second, name)) for name in ("wi", "wo", "value", "valid"))
+    if first is not second and not same:
+        got = f"fits to {first.source} ({first.n_samples} samples) and {second.source} ({second.n_samples} samples)"
+        raise FitmatError(f"compare needs two fits to the same measurements, got {got}.")
 
 
 def _concluded(pair: tuple[Posterior, Posterior], found: Distances, **parts: Any) -> Match:

@@ -22,8 +22,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
+from numpy.typing import ArrayLike
 
+from fitmat import arguments
 from fitmat._types import Array, Scalar, Vec3
+from fitmat.errors import FitmatError
 from fitmat.maths.arrays import library
 
 COS_MIN = 1e-7
@@ -36,6 +39,40 @@ def from_angles(theta: np.ndarray, phi: np.ndarray) -> Float[np.ndarray, "n 3"]:
     """Zenith and azimuth angles in radians, shape (n,), to unit vectors (n, 3)."""
     sin = np.sin(theta)
     return np.stack([sin * np.cos(phi), sin * np.sin(phi), np.cos(theta)], axis=-1)
+
+
+def directions(theta: ArrayLike, phi: ArrayLike = 0.0, *, degrees: bool = False) -> Float[np.ndarray, "n 3"]:
+    """Unit vectors (sinθ cosφ, sinθ sinφ, cosθ), as `fitmat.evaluate` takes them.
+
+    Args:
+        theta: Zenith angles, (n,) or one; below 0 on the side opposite to phi.
+        phi: Azimuths, (n,) or one; of light from azimuth 0 the mirror side is at half a turn.
+        degrees: Whether both are in degrees instead of radians.
+
+    Raises:
+        FitmatError: something is no number, or out of range, as degrees are for radians; or the lengths differ.
+
+    Example:
+        >>> import fitmat as fm
+        >>> wi, wo = fm.directions(30, degrees=True), fm.directions([0, 30, 60], 180, degrees=True)
+        >>> fm.evaluate(fm.model("lambert", kd=0.5), wi, wo).shape
+        (3, 1)
+    """
+    arguments.flags(degrees=degrees)
+    if degrees:
+        angle = np.deg2rad(arguments.numbers("theta", theta, -90.0, 90.0, of=" degrees"))
+        turn = np.deg2rad(arguments.numbers("phi", phi, -360.0, 360.0, of=" degrees"))
+    else:
+        angle = arguments.angles("theta", theta, arguments.ZENITH, signed=True)
+        turn = arguments.angles("phi", phi, arguments.AZIMUTH, signed=True)
+    try:
+        angle, turn = np.broadcast_arrays(np.atleast_1d(angle), turn)
+    except ValueError:
+        angle = turn = np.zeros((0, 0))
+    if angle.ndim != 1:
+        shapes = f"theta and phi have shapes {np.shape(theta)} and {np.shape(phi)}"
+        raise FitmatError(f"{shapes}, expected (n,) or one number each.")
+    return from_angles(angle, turn)
 
 
 def zenith(directions: np.ndarray) -> Float[np.ndarray, " n"]:

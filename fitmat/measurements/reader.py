@@ -6,7 +6,7 @@ It repairs nothing and drops nothing; what it cannot know it asks for.
 import dataclasses
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, cast, runtime_checkable
 
 import numpy as np
 import polars as pl
@@ -208,6 +208,18 @@ def measured(recording: Recording, options: Options) -> Measurements:
         warnings=recording.warnings,
     )
     return without_blocked(found)
+
+
+def measurements_of(given: object) -> Measurements:
+    """Measurements, or those that a path leads to.
+
+    Raises:
+        FitmatError: as `read`, or it is neither.
+    """
+    if isinstance(given, str | os.PathLike):
+        return read(given)
+    arguments.kind("measurements", given, Measurements, str, os.PathLike)
+    return cast(Measurements, given)
 
 
 def _recording(source: Source, columns: str | Mapping[str, str | int] | None, options: Options) -> Recording:

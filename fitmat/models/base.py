@@ -203,15 +203,17 @@ def padded_length(count: int) -> int:
 
 
 def direction_pairs(wi: ArrayLike, wo: ArrayLike) -> list[Float[np.ndarray, "n 3"]]:
-    """Both as arrays of numbers.
+    """Both as arrays of numbers, (n, 3); a single direction beside n stands for as many.
 
     Raises:
-        FitmatError: they are no numbers, or not of the same shape (n, 3).
+        FitmatError: they are no numbers, or not of shape (n, 3).
     """
     pair = [arguments.numbers(name, w) for name, w in (("wi", wi), ("wo", wo))]
-    if pair[0].shape != pair[1].shape or pair[0].ndim != 2 or pair[0].shape[1] != 3 or len(pair[0]) == 0:
-        raise ModelError(f"wi and wo have shapes {pair[0].shape} and {pair[1].shape}: expected the same (n, 3), n ≥ 1.")
-    return pair
+    listed = all(w.ndim == 2 and w.shape[1] == 3 and len(w) > 0 for w in pair)
+    if not listed or len({1, *map(len, pair)}) > 2:
+        got = f"wi and wo have shapes {pair[0].shape} and {pair[1].shape}"
+        raise ModelError(f"{got}: expected (n, 3), n ≥ 1, of both, or (1, 3) of one.")
+    return list(np.broadcast_arrays(*pair))
 
 
 @overload
@@ -225,8 +227,9 @@ def evaluate(
 
     Args:
         model: From `fitmat.model`.
-        wi: Unit vectors to the light, (n, 3), local frame with the normal +z.
-        wo: Unit vectors to the sensor, (n, 3).
+        wi: Unit vectors to the light, (n, 3) or (1, 3), local frame with the normal +z; `fitmat.directions` makes
+            them from angles.
+        wo: Unit vectors to the sensor, (n, 3) or (1, 3).
         samples: Paths for each pair, at least 2, of a model that is estimated, such as `ggx-walk`; for no other.
         seed: Of its random numbers.
 

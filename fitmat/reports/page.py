@@ -22,7 +22,8 @@ from markupsafe import Markup
 
 from fitmat import arguments, files
 from fitmat.errors import OutputError
-from fitmat.fitting.result import RESULTS, Fit
+from fitmat.fitting.concluding import RESULTS
+from fitmat.fitting.result import Fit
 from fitmat.judgement import budget
 from fitmat.judgement.choice import Choice
 from fitmat.match.ablation import EXPLAINS, TERMS
@@ -148,6 +149,7 @@ def _rendered(study: Study, pictures: "_Pictures") -> str:
         version=version("fitmat"),
         study=study,
         findings=findings,
+        sampled=any(found.posterior.diagnostics is not None for found in findings),
         measurements=study.measurements,
         loss=findings[0].fit.loss,
         left_out=_left_out(findings[0].fit),

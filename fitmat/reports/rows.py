@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 
+from fitmat.fitting.quantities import UNDETERMINED
 from fitmat.studies.findings import Findings
 from fitmat.text import interval, visible, with_error
-from fitmat.uncertainty.quantities import UNDETERMINED
 
 
 def parameter_rows(found: Findings) -> list[dict[str, str]]:

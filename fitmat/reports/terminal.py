@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from fitmat.fitting.result import RESULTS
+from fitmat.fitting.concluding import RESULTS
 from fitmat.reports.rows import parameter_rows
 from fitmat.studies.findings import Findings
 from fitmat.studies.study import MOST_SAMPLED, Study

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.fitting import priors
+from fitmat.fitting.quantities import Quantity
 from fitmat.fitting.result import Fit
 from fitmat.judgement.budget import Budget, draw_up
 from fitmat.judgement.doubts import Doubts, find_doubts
@@ -21,9 +22,8 @@ from fitmat.judgement.scope import describe_scope
 from fitmat.judgement.several_facets import left_out
 from fitmat.studies.curves import Curve, predict_curves
 from fitmat.text import brief
-from fitmat.uncertainty.estimate import Quantity
+from fitmat.uncertainty.derived import derived
 from fitmat.uncertainty.posterior import Posterior
-from fitmat.uncertainty.quantities import derived, parameters
 from fitmat.uncertainty.second_sampler import SecondOpinion
 
 
@@ -110,7 +110,7 @@ def find(
         check: Whether the model can make such data, where that was asked.
     """
     fit = posterior.fit
-    fitted = parameters(posterior, () if identifiability is None else identifiability.undetermined)
+    fitted = posterior.quantities(() if identifiability is None else identifiability.undetermined)
     follows = derived(posterior, fitted)
     return Findings(
         posterior=posterior,

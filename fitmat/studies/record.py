@@ -6,7 +6,8 @@ It computes nothing; numbers that are not finite become null.
 from importlib.metadata import version
 from typing import Any
 
-from fitmat.fitting.result import RESULTS
+from fitmat.fitting.concluding import RESULTS
+from fitmat.fitting.quantities import UNDETERMINED, Quantity
 from fitmat.judgement.budget import ALBEDO_DEG, COVERAGE, SOURCES, Budget, Line
 from fitmat.judgement.choice import Choice
 from fitmat.judgement.identifiability.verdicts import Identifiability
@@ -16,8 +17,7 @@ from fitmat.studies.findings import Findings
 from fitmat.studies.result import FORMAT, masking
 from fitmat.studies.study import Study
 from fitmat.text import plain
-from fitmat.uncertainty.estimate import Estimate, Quantity
-from fitmat.uncertainty.quantities import UNDETERMINED
+from fitmat.uncertainty.estimate import Estimate
 
 
 def to_dict(study: Study) -> dict[str, Any]:

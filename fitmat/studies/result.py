@@ -19,12 +19,12 @@ from jaxtyping import Float
 from fitmat import arguments
 from fitmat.errors import ModelError, ReadError
 from fitmat.fitting.coordinates import channel_names
+from fitmat.fitting.quantities import Quantity, dataframe, named
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import entries, vector
 from fitmat.models.registry import LOBES, lobe_names
 from fitmat.models.registry import model as built
 from fitmat.text import brief
-from fitmat.uncertainty.estimate import Quantity
 
 FORMAT = 1
 """Of the record; it grows when what an older one says would be misread."""
@@ -45,7 +45,7 @@ class Fitted:
         model: With the best parameters, on its tilted mount where that was fitted, and without the instrument.
         channels: Names of its channels.
         parameters: As the report says them, those of instrument and noise and the discrepancy included.
-        result: How the fit ended, a key of `fitting.result.RESULTS`.
+        result: How the fit ended, a key of `fitting.concluding.RESULTS`.
         verdict: How far the draws can be trusted, a key of `uncertainty.posterior.VERDICTS`.
         doubts: What speaks against the intervals, as sentences.
         file: Where the draws lie.
@@ -61,6 +61,18 @@ class Fitted:
     file: Path
 
     __repr__ = brief
+
+    def __getitem__(self, name: str) -> Quantity:
+        """One of the `parameters`.
+
+        Raises:
+            ModelError: the model has none of that name.
+        """
+        return named(self.parameters, name, self.name)
+
+    def to_dataframe(self) -> pl.DataFrame:
+        """The parameters as a table, one row for each and each channel."""
+        return dataframe(self.parameters, self.name, self.channels)
 
     @functools.cached_property
     def draws(self) -> Float[np.ndarray, "m p"]:

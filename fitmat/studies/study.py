@@ -25,6 +25,7 @@ from fitmat.judgement.prediction import sections
 from fitmat.judgement.predictive_check import PredictiveCheck, check_predictions
 from fitmat.match.match import Match, compare, is_empirical, is_microfacet, paired_draws
 from fitmat.measurements.large.stream import Stream, hold
+from fitmat.measurements.reader import measurements_of
 from fitmat.measurements.samples import Measurements
 from fitmat.models.around.tilt import Tilted
 from fitmat.studies.findings import Findings, find
@@ -105,7 +106,7 @@ class Study:
 
 
 def study(
-    measurements: Measurements | Stream,
+    measurements: Measurements | Stream | str | os.PathLike[str],
     models: str | Sequence[str] = DEFAULT_MODELS,
     *,
     fixed: Mapping[str, ArrayLike] | None = None,
@@ -124,7 +125,8 @@ def study(
     """Fit models, sample their posteriors, match them and judge them: what `fitmat fit` does with a file.
 
     Args:
-        measurements: From `fitmat.read`; more than `MOST_AT_ONCE` rows are passed over block by block.
+        measurements: From `fitmat.read`, or a file that needs no options; more than `MOST_AT_ONCE` rows are passed
+            over block by block.
         models: Names, or a text with commas between them; "all" for every model that makes sense.
         fixed: Parameters to hold, by name, in every model that has them: `{"ks": 1.0}`.
         priors: What is known beforehand, by name: centre and standard deviation, `{"eta": (1.5, 0.05)}`.
@@ -150,7 +152,7 @@ def study(
     Example:
         >>> study(read("measurements.csv"), "lambert+phong,lambert+ggx").match.verdict  # doctest: +SKIP
     """
-    arguments.kind("measurements", measurements, Measurements, Stream)
+    given = measurements if isinstance(measurements, Stream) else measurements_of(measurements)
     arguments.kind("models", models, str, Sequence)
     arguments.named(fixed=fixed, priors=priors)
     for name, text in (("loss", loss), ("masking", masking), ("ior", ior)):
@@ -161,9 +163,9 @@ def study(
     arguments.function("progress", progress)
     say = progress or (lambda *_: None)
     if second_opinion:
-        refuse_unsampled(measurements.n_valid, MOST_SAMPLED, loss, sampling=sampling)
+        refuse_unsampled(given.n_valid, MOST_SAMPLED, loss, sampling=sampling)
         second_sampler.require()
-    stream = _as_stream(measurements)
+    stream = _as_stream(given)
     shown = stream if isinstance(stream, Measurements) else stream.part
     known = {"fixed": fixed, "priors": priors, "loss": loss, "masking": masking, "ior": ior, "tilt": tilt}
     jobs = plan(models, shown, **known)
@@ -174,7 +176,7 @@ def study(
     walking = sampling and first[0].fit.loss.posterior and first[0].fit.n_values <= MOST_SAMPLED
     posteriors = sample_each(first, seed=seed, resume=resume, progress=say) if walking else first
     found = judge(posteriors, seed=seed, second_opinion=second_opinion, full=full, progress=say)
-    return found if stream is shown else dataclasses.replace(found, rows=_counted(measurements))
+    return found if stream is shown else dataclasses.replace(found, rows=_counted(given))
 
 
 def _counted(given: Measurements | Stream) -> tuple[int, int]:

@@ -8,8 +8,6 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.text import brief
-
 
 @dataclasses.dataclass(frozen=True)
 class Estimate:
@@ -27,35 +25,6 @@ class Estimate:
     def has_interval(self) -> bool:
         """Whether draws spread about it; those of an objective do not."""
         return self.ci95[0] < self.ci95[1]
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Quantity:
-    """One reported quantity; arrays hold one entry per channel, or a single one for shared quantities.
-
-    Attributes:
-        name: Parameter name.
-        symbol: The letter of the literature.
-        unit: "1" for none.
-        doc: What it means.
-        value: Best fit, (k,).
-        sd: Standard deviation, (k,); NaN where `remarks` says why there is none.
-        ci95: 95 % interval, (k, 2).
-        per_channel: Whether the k entries are channels.
-        remarks: (k,); "" or a reason: "fixed", "at its lower bound", "not determined".
-    """
-
-    name: str
-    symbol: str
-    unit: str
-    doc: str
-    value: np.ndarray
-    sd: np.ndarray
-    ci95: np.ndarray
-    per_channel: bool
-    remarks: tuple[str, ...]
-
-    __repr__ = brief
 
 
 def limits(

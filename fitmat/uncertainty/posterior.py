@@ -7,6 +7,7 @@ import dataclasses
 import functools
 import io
 import json
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,8 @@ from jaxtyping import Float
 from fitmat.errors import OutputError
 from fitmat.extras import needed
 from fitmat.fitting.coordinates import channel_names
-from fitmat.fitting.result import Fit
+from fitmat.fitting.quantities import Quantity, dataframe, named
+from fitmat.fitting.result import Fit, by_curvature, quantities
 from fitmat.models.parameters import Entry
 from fitmat.text import brief, html_table, text_table, with_error
 from fitmat.uncertainty.estimate import limits
@@ -159,6 +161,44 @@ class Posterior:
     def _repr_html_(self) -> str:
         caption = f"{self.fit.name}: posterior {self.verdict}."
         return html_table(caption, ("parameter", "value ± sd", "95 % interval"), self._rows())
+
+    def quantities(self, undetermined: Collection[str] = ()) -> list[Quantity]:
+        """The model's parameters, then the discrepancy s where the loss infers it; an objective gives values only.
+
+        Value: the best fit. Intervals: `estimate.limits` of the draws where these follow the posterior itself;
+        otherwise `fitting.quantities.by_curvature`.
+
+        Args:
+            undetermined: Names of parameters, with their channel where there are several, that are not determined
+                beside those of the fit.
+        """
+        sampled = self.exact and self.fit.loss.posterior
+        spread = (self.sd(), self.interval()) if sampled else by_curvature(self.fit)
+        found = quantities(self.fit, *spread, undetermined)
+        return [*found, self._discrepancy()] if self.fit.loss.infers_discrepancy else found
+
+    def _discrepancy(self) -> Quantity:
+        """s; where the best fit has none, its interval is one-sided."""
+        best, draws = self.fit.discrepancy, self.discrepancy
+        ends = limits(np.asarray(best), draws) if best > 0 else np.array([0.0, np.quantile(draws, 0.95)])
+        words = "spread of ∛(f cosθ_i) that the model cannot explain"
+        return Quantity(
+            *("discrepancy", "s", "sr^(-1/3)", words, np.array([best]), np.array([draws.std()]), ends[None]),
+            per_channel=False,
+            remarks=("",),
+        )
+
+    def __getitem__(self, name: str) -> Quantity:
+        """A parameter with its standard deviation and 95 % interval.
+
+        Raises:
+            ModelError: the model has none of that name.
+        """
+        return named(self.quantities(), name, self.fit.name)
+
+    def to_dataframe(self) -> pl.DataFrame:
+        """The parameters as a table, one row for each and each channel; the draws are `table`."""
+        return dataframe(self.quantities(), self.fit.name, self.fit.measurements.channels)
 
     def sd(self) -> Float[np.ndarray, " p"]:
         """Standard deviation of each parameter."""

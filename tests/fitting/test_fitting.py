@@ -10,8 +10,9 @@ from scipy.optimize import curve_fit
 
 import fitmat as fm
 from fitmat.errors import FitmatError, ModelError
+from fitmat.fitting.concluding import RESULTS
 from fitmat.fitting.information import inverse_information
-from fitmat.fitting.result import RESULTS, Fit
+from fitmat.fitting.result import Fit
 
 SIGMAS = 3.0
 """Standard deviations that a seeded estimate may be off: 1 in 370 for each of some 40 parameters and fixed seeds."""

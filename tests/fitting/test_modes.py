@@ -9,15 +9,16 @@ from hypothesis import strategies as st
 
 import fitmat as fm
 from fitmat.fitting import refining
+from fitmat.fitting.concluding import conclude
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.ends import AS_GOOD, Ends, behind, home
 from fitmat.fitting.likelihood import Data
-from fitmat.fitting.result import Fit, conclude
+from fitmat.fitting.quantities import SEVERAL
+from fitmat.fitting.result import Fit
 from fitmat.fitting.symmetries import nearest
 from fitmat.judgement.identifiability.verdicts import STATES, identify
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import entries, vector, with_vector
-from fitmat.uncertainty.quantities import SEVERAL, parameters
 
 TURNED = ("ggx-aniso", "beckmann-aniso", "ward-aniso", "ashikhmin-shirley-aniso", "disney-2012", "disney-2015")
 
@@ -75,7 +76,7 @@ def test_what_is_held_is_not_exchanged() -> None:
 
 def test_a_rotation_comes_home_and_sits_on_no_bound(brushed: Fit) -> None:
     """Truth 88°, at which −92° and 88° are one surface: the interval crosses neither bound, and starts agree."""
-    rotation = next(q for q in parameters(fm.laplace(brushed, seed=1)) if q.name == "rotation")
+    rotation = next(q for q in fm.laplace(brushed, seed=1).quantities() if q.name == "rotation")
     slopes = brushed.values[[e.place.start for e in brushed.entries if e.name.startswith("alpha")]]
     truth = 88.0 if slopes[0] < slopes[1] else -2.0
     assert abs((rotation.value[0] - truth + 90.0) % 180.0 - 90.0) < 4 * rotation.sd[0]
@@ -127,7 +128,7 @@ def test_an_end_as_good_elsewhere_vetoes_determined(plain: Fit) -> None:
     verdict = next(v for v in found.verdicts if v.name == "alpha")
     assert verdict.ci95[1] == pytest.approx(0.215)
     assert "Another optimum fits as well, with alpha = 0.215" in found.words
-    shown = next(q for q in parameters(posterior) if q.name == "alpha")
+    shown = next(q for q in posterior.quantities() if q.name == "alpha")
     assert shown.remarks == (SEVERAL,)
     assert shown.ci95[0, 1] == pytest.approx(0.215)
     assert np.isnan(shown.sd[0])

@@ -13,7 +13,7 @@ import pytest
 import fitmat as fm
 from fitmat.judgement.budget import Budget, Line, draw_up
 from fitmat.measurements.instrument import Instrument
-from fitmat.uncertainty.quantities import derived, parameters
+from fitmat.uncertainty.derived import derived
 
 gtc: Any = GTC
 DEGREE = np.pi / 180
@@ -24,7 +24,7 @@ DIGITS = 5e-4
 
 def budget_of(fit: fm.Fit) -> Budget:
     posterior = fm.laplace(fit, seed=0)
-    fitted = parameters(posterior)
+    fitted = posterior.quantities()
     found = draw_up(posterior, fitted, derived(posterior, fitted))
     assert found is not None
     return found
@@ -181,7 +181,7 @@ def test_an_objective_has_no_budget() -> None:
     m = fm.simulate(fm.model("lambert", kd=0.3), [0.2, 0.9], np.linspace(-1.3, 1.3, 11),
                     relative_noise=0.02, absolute_noise=1e-3, seed=0)  # fmt: skip
     posterior = fm.laplace(fm.fit(m, "lambert", loss="log10"), seed=0)
-    assert draw_up(posterior, parameters(posterior), ()) is None
+    assert draw_up(posterior, posterior.quantities(), ()) is None
 
 
 @pytest.mark.parametrize("u", [0.0, np.nan])

@@ -356,6 +356,15 @@ def test_the_page_tells_the_match_in_words(match: Match, known: bool) -> None:
     assert page.count("lambert+ggx by lambert+blinn-phong") == 4
 
 
+def test_fits_stand_for_their_approximations(fits: tuple[Fit, Fit]) -> None:
+    """In either order, and also where the same values were read twice."""
+    again = dataclasses.replace(fits[0], measurements=dataclasses.replace(fits[0].measurements))
+    found = compare(fits[1], again, spheres=False)
+    meant = compare(*(fm.laplace(fit, seed=0) for fit in fits), spheres=False)
+    assert found.hemisphere_distance == meant.hemisphere_distance
+    assert found.empirical.fit.name == fits[0].name
+
+
 def test_what_cannot_be_compared_is_refused(fits: tuple[Fit, Fit]) -> None:
     blinn, facets = (fm.laplace(fit, seed=1) for fit in fits)
     with pytest.raises(
@@ -365,8 +374,11 @@ def test_what_cannot_be_compared_is_refused(fits: tuple[Fit, Fit]) -> None:
     with pytest.raises(FitmatError, match=r"got lambert\+blinn-phong and lambert\+blinn-phong\."):
         compare(blinn, blinn)
     m = fits[0].measurements
-    elsewhere = dataclasses.replace(blinn, fit=dataclasses.replace(fits[0], measurements=m.rows(np.arange(51))))
-    with pytest.raises(FitmatError, match=r"compare needs two fits to the same Measurements object\."):
+    elsewhere = dataclasses.replace(blinn, fit=dataclasses.replace(fits[0], measurements=m.rows(np.arange(50))))
+    with pytest.raises(
+        FitmatError,
+        match=r"compare needs two fits to the same measurements, got fits to .* samples\) and .* samples\)\.",
+    ):
         compare(elsewhere, facets)
     broken = dataclasses.replace(blinn, fit=dataclasses.replace(fits[0], result="nonfinite", log_likelihood=np.nan))
     with pytest.raises(

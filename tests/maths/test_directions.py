@@ -1,5 +1,7 @@
 """Angles and directions: the conventions of `fitmat.maths.directions`, on cases that are known by hand."""
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -7,9 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fitmat.errors import FitmatError
 from fitmat.maths.directions import (
     above,
     cos_difference,
+    directions,
     from_angles,
     half_vector,
     mirror,
@@ -32,6 +36,28 @@ def test_angles_by_hand() -> None:
     np.testing.assert_allclose(_at(0, 77), [[0, 0, 1]], atol=ROUNDING)
     np.testing.assert_allclose(_at(90, 90), [[0, 1, 0]], atol=ROUNDING)
     np.testing.assert_allclose(_at(30, 180), [[-0.5, 0, np.sqrt(3) / 2]], atol=ROUNDING)
+
+
+def test_directions_by_hand_in_either_unit() -> None:
+    """One azimuth serves all zenith angles; below 0 is the other side."""
+    sin = np.sqrt(3) / 2
+    expected = [[0, 0, 1], [-0.5, 0, sin], [0.5, 0, sin]]
+    np.testing.assert_allclose(directions([0, 30, -30], 180, degrees=True), expected, atol=ROUNDING)
+    np.testing.assert_allclose(directions([0, np.pi / 6, -np.pi / 6], np.pi), expected, atol=ROUNDING)
+    np.testing.assert_allclose(directions(0.0), [[0, 0, 1]], atol=ROUNDING)
+
+
+@pytest.mark.parametrize(
+    ("theta", "phi", "degrees", "message"),
+    [
+        (30, 0, False, r"theta = 30: expected −π/2 to π/2 radians\. Are the angles in degrees"),
+        (95, 0, True, r"theta is 95\.0, expected numbers from -90 to 90 degrees"),
+        ([0.1, 0.2], [1.0, 2.0, 3.0], False, r"shapes \(2,\) and \(3,\), expected \(n,\) or one number each"),
+    ],
+)
+def test_directions_refuse(theta: Any, phi: Any, degrees: bool, message: str) -> None:
+    with pytest.raises(FitmatError, match=message):
+        directions(theta, phi, degrees=degrees)
 
 
 @given(st.floats(1e-12, np.pi / 2), st.floats(-3.14, 3.14))

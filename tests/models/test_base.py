@@ -231,9 +231,9 @@ def test_model_refuses(name: str, options: dict[str, Any], message: str) -> None
         (
             np.zeros((2, 3)),
             np.zeros((3, 3)),
-            r"wi and wo have shapes \(2, 3\) and \(3, 3\): expected the same \(n, 3\)",
+            r"wi and wo have shapes \(2, 3\) and \(3, 3\): expected \(n, 3\), n ≥ 1, of both",
         ),
-        ([0.0, 0.0, 1.0], [0.0, 0.0, 1.0], r"shapes \(3,\) and \(3,\): expected the same \(n, 3\)"),
+        ([0.0, 0.0, 1.0], [0.0, 0.0, 1.0], r"shapes \(3,\) and \(3,\): expected \(n, 3\), n ≥ 1, of both"),
         ([[0, 0, 1], [0, 0, 2.0]], [[0, 0, 1], [0, 0, 1]], r"wi row 1 has length 2: expected unit vectors"),
         ([[0, 0, 1.0]], [[0, np.nan, 1]], r"wo row 0 has length nan: expected unit vectors"),
     ],

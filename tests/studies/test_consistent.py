@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import fitmat as fm
+from fitmat.fitting.quantities import UNDETERMINED
 from fitmat.reports.rows import parameter_rows
 from fitmat.studies import record
 from fitmat.studies.study import Study, study
 from fitmat.uncertainty.estimate import Estimate
-from fitmat.uncertainty.quantities import UNDETERMINED
 
 ROUNDING = 1e-9
 """Of quantiles."""

@@ -119,7 +119,7 @@ def test_everything_is_computed_once_and_then_read(
         monkeypatch.setattr(module, name, call)
 
     watched = [
-        (findings, "parameters"),
+        (Posterior, "quantities"),
         (findings, "derived"),
         (findings, "find_doubts"),
         (findings, "fit_metrics"),

@@ -12,7 +12,6 @@ from fitmat.fitting.result import Fit
 from fitmat.uncertainty.density import log_posterior
 from fitmat.uncertainty.laplace import LAPLACE_DRAWS, MOST_CORRECTED, PROPOSALS, heavy_tailed, smoothed
 from fitmat.uncertainty.posterior import GOOD_PARETO, VERDICTS, Posterior
-from fitmat.uncertainty.quantities import parameters
 
 EFFECTIVE = 1000
 """2000 draws from 4000 proposals of which about half count are worth at least so many independent ones."""
@@ -165,7 +164,7 @@ def test_the_seed_is_the_correction(near_bound: Fit) -> None:
 
 def test_reported_intervals_come_from_corrected_draws(near_bound: Fit) -> None:
     corrected, plain = (fm.laplace(near_bound, seed=1, corrected=c) for c in (True, False))
-    np.testing.assert_allclose(parameters(corrected)[0].ci95, corrected.interval())
-    assert parameters(plain)[0].sd == pytest.approx(np.sqrt(near_bound.covariance[0, 0]))
+    np.testing.assert_allclose(corrected.quantities()[0].ci95, corrected.interval())
+    assert plain.quantities()[0].sd == pytest.approx(np.sqrt(near_bound.covariance[0, 0]))
     doubtful: Posterior = dataclasses.replace(corrected, pareto_k=0.8)
-    np.testing.assert_allclose(parameters(doubtful)[0].ci95, parameters(plain)[0].ci95)
+    np.testing.assert_allclose(doubtful.quantities()[0].ci95, plain.quantities()[0].ci95)

@@ -5,12 +5,12 @@ It fits no model, repairs nothing and draws nothing.
 
 import dataclasses
 import html
+import os
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from fitmat import arguments
 from fitmat.judgement.examination import finding_words, words
 from fitmat.judgement.examination.consistency import Agreement, Consistency, consistency
 from fitmat.judgement.examination.coverage import Coverage, coverage, mirror_frame
@@ -20,6 +20,7 @@ from fitmat.judgement.examination.phrases import Said
 from fitmat.judgement.examination.prospects import ASSUMED, Prospect, prospects
 from fitmat.judgement.examination.value_range import ValueRange, value_range
 from fitmat.measurements.noise import Noise, channel_laws, measured_noise
+from fitmat.measurements.reader import measurements_of
 from fitmat.measurements.samples import Measurements
 from fitmat.text import brief, plain
 
@@ -146,11 +147,12 @@ class Examination:
         }
 
 
-def examine(measurements: Measurements) -> Examination:
+def examine(measurements: Measurements | str | os.PathLike[str]) -> Examination:
     """Describe a file of measurements before any fit.
 
     Args:
-        measurements: From `fitmat.read`; up to some million rows, of which large files use an even part.
+        measurements: From `fitmat.read`, or a file that needs no options; up to some million rows, of which large
+            files use an even part.
 
     Returns:
         An `Examination`; print it.
@@ -159,7 +161,7 @@ def examine(measurements: Measurements) -> Examination:
         >>> import fitmat as fm, numpy as np
         >>> print(examine(fm.from_arrays(np.full(3, 0.5), [-0.5, 0.0, 0.5], [0.1, 0.1, 0.3])))  # doctest: +SKIP
     """
-    arguments.kind("measurements", measurements, Measurements)
+    measurements = measurements_of(measurements)
     noise = _noise(measurements)
     laws = tuple(channel_laws(measurements, noise)) if noise.known else (None,) * len(measurements.channels)
     looked = _looked(measurements, noise)

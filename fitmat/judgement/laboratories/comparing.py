@@ -24,8 +24,8 @@ from fitmat.measurements.instrument import UNKNOWN_SCALE
 from fitmat.measurements.samples import Measurements
 from fitmat.models.registry import model
 from fitmat.text import FEW, brief, html_table, plain, text_table, visible, with_error
+from fitmat.uncertainty.derived import derived
 from fitmat.uncertainty.laplace import laplace
-from fitmat.uncertainty.quantities import derived, parameters
 
 MODEL = "lambert+ggx"
 """Of the surface, where none is named."""
@@ -229,7 +229,7 @@ def _agreements(fits: Sequence[Fit]) -> tuple[tuple[Agreement, ...], tuple[str, 
     own = {*OF_INSTRUMENT, "dark"}
     for each in fits:
         posterior = laplace(each, seed=0, corrected=False)
-        fitted = parameters(posterior)
+        fitted = posterior.quantities()
         found = draw_up(posterior, fitted, derived(posterior, fitted))
         for line in found.lines if found else ():
             if line.remark != "fixed" and line.name not in own:

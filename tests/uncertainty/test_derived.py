@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 import fitmat as fm
+from fitmat.errors import ModelError
+from fitmat.fitting.quantities import Quantity
 from fitmat.fitting.result import Fit
-from fitmat.uncertainty.estimate import Quantity
+from fitmat.uncertainty.derived import derived
 from fitmat.uncertainty.posterior import Posterior
-from fitmat.uncertainty.quantities import derived, parameters
 
 INTERPOLATION = 1e-3
 """Relative; a quantile between two draws of 2000, taken before or after a smooth change of variable."""
@@ -39,8 +40,25 @@ def named(quantities: list[Quantity]) -> dict[str, Quantity]:
     return {q.name: q for q in quantities}
 
 
+def test_a_parameter_is_asked_for_by_its_name(fit: Fit) -> None:
+    """Of the fit by its curvature, of a posterior by its draws; as a table with one row each."""
+    posterior = fm.laplace(fit, seed=1)
+    alpha, drawn = fit["alpha"], posterior["alpha"]
+    assert alpha.value == fit.values[2]
+    assert alpha.sd == pytest.approx(np.sqrt(fit.covariance[2, 2]))
+    np.testing.assert_array_equal(drawn.ci95[0], posterior.interval()[2])
+    low, high = alpha.ci95[0]
+    assert str(alpha).startswith("alpha (α) = 0.")
+    assert str(alpha).endswith(f"(95 % {low:.4g} – {high:.4g})")
+    table = posterior.to_dataframe()
+    assert table["parameter"].to_list() == ["kd", "ks", "alpha", "eta", "discrepancy"]
+    assert table.row(2, named=True)["sd"] == float(drawn.sd[0])
+    with pytest.raises(ModelError, match=r"lambert\+ggx has no parameter 'alfa', expected one of kd, ks, alpha, eta\."):
+        fit["alfa"]
+
+
 def test_parameters_are_listed_with_their_discrepancy(fit: Fit) -> None:
-    found = parameters(fm.laplace(fit, seed=1))
+    found = fm.laplace(fit, seed=1).quantities()
     assert [(q.name, q.symbol, q.unit) for q in found] == [
         ("kd", "k_d", "1"),
         ("ks", "k_s", "1"),
@@ -55,7 +73,7 @@ def test_parameters_are_listed_with_their_discrepancy(fit: Fit) -> None:
 
 def test_laplace_intervals_are_taken_where_the_parameter_lives(fit: Fit) -> None:
     """Linear for kd and ks; value·exp(± 1.96 sd/value) for alpha and eta, whose scale is logarithmic."""
-    found, sd = named(parameters(fm.laplace(fit, seed=1, corrected=False))), np.sqrt(np.diagonal(fit.covariance))
+    found, sd = named(fm.laplace(fit, seed=1, corrected=False).quantities()), np.sqrt(np.diagonal(fit.covariance))
     for k, name in enumerate(("kd", "ks")):
         np.testing.assert_allclose(
             found[name].ci95[0], fit.values[k] + 1.959964 * sd[k] * np.array([-1, 1]), rtol=ROUNDING
@@ -68,7 +86,7 @@ def test_laplace_intervals_are_taken_where_the_parameter_lives(fit: Fit) -> None
 
 def test_laplace_intervals_end_at_the_bounds(fit: Fit) -> None:
     wide = dataclasses.replace(fit, likelihood_covariance=np.diag([1.0, 100.0, 0.5, 1e4]))
-    found = named(parameters(Posterior(wide, "laplace", fit.values[None], np.zeros(1))))
+    found = named(Posterior(wide, "laplace", fit.values[None], np.zeros(1)).quantities())
     assert found["kd"].ci95.tolist() == [[0.0, 1.0]]
     assert found["ks"].ci95.tolist() == [[0.0, 10.0]]
     assert found["alpha"].ci95[0, 1] == 1.0
@@ -78,7 +96,7 @@ def test_laplace_intervals_end_at_the_bounds(fit: Fit) -> None:
 def test_sampled_intervals_are_quantiles(fit: Fit) -> None:
     posterior = fm.sample(fit, seed=1, max_steps=300)
     assert posterior.usable
-    found = parameters(posterior)
+    found = posterior.quantities()
     for k, quantity in enumerate(found[:4]):
         np.testing.assert_array_equal(quantity.ci95[0], np.quantile(posterior.values[:, k], [0.025, 0.975]))
         np.testing.assert_allclose(quantity.sd, [posterior.values[:, k].std()])
@@ -87,7 +105,7 @@ def test_sampled_intervals_are_quantiles(fit: Fit) -> None:
 def test_unusable_chains_fall_back_on_laplace(fit: Fit) -> None:
     short, gauss = fm.sample(fit, seed=1, max_steps=8), fm.laplace(fit, seed=1, corrected=False)
     assert not short.usable
-    for one, other in zip(parameters(short)[:4], parameters(gauss)[:4], strict=True):
+    for one, other in zip(short.quantities()[:4], gauss.quantities()[:4], strict=True):
         np.testing.assert_array_equal(one.ci95, other.ci95)
         np.testing.assert_array_equal(one.sd, other.sd)
 
@@ -96,14 +114,14 @@ def test_a_discrepancy_of_zero_has_a_one_sided_interval(fit: Fit) -> None:
     s = np.abs(np.random.default_rng(1).normal(size=1000))
     none = Posterior(dataclasses.replace(fit, discrepancy=0.0), "laplace", np.tile(fit.values, (1000, 1)), s)
     some = Posterior(dataclasses.replace(fit, discrepancy=0.5), "laplace", np.tile(fit.values, (1000, 1)), s)
-    assert parameters(none)[-1].ci95[0] == pytest.approx([0.0, np.quantile(s, 0.95)])
-    assert parameters(some)[-1].ci95[0] == pytest.approx(np.quantile(s, [0.025, 0.975]))
+    assert none.quantities()[-1].ci95[0] == pytest.approx([0.0, np.quantile(s, 0.95)])
+    assert some.quantities()[-1].ci95[0] == pytest.approx(np.quantile(s, [0.025, 0.975]))
 
 
 def test_remarks_say_why_a_number_is_missing(fit: Fit) -> None:
     model = fm.model("lambert+ggx", channels=1, kd=1.0, ks=0.0, alpha=0.3, eta=1.5)
     other = dataclasses.replace(fit, model=model, held={"eta": np.array([1.5])}, undetermined=("alpha",))
-    found = named(parameters(fm.laplace(other, seed=1)))
+    found = named(fm.laplace(other, seed=1).quantities())
     assert found["kd"].remarks == ("at its upper bound",)
     assert found["ks"].remarks == ("at its lower bound",)
     assert found["eta"].remarks == ("fixed",)
@@ -113,7 +131,7 @@ def test_remarks_say_why_a_number_is_missing(fit: Fit) -> None:
 
 def following(posterior: Posterior) -> list[Quantity]:
     """What follows from a posterior's parameters."""
-    return derived(posterior, parameters(posterior))
+    return derived(posterior, posterior.quantities())
 
 
 def test_f0_follows_from_eta(fit: Fit) -> None:
