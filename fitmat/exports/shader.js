@@ -18,12 +18,14 @@ void main() {
 }`;
 
 class Gpu {
-    // Throws where there is no WebGL 2 with floating-point pixels.
+    // Throws where there is no WebGL 2 with floating-point pixels; `slow` where it runs on the processor.
     constructor(canvas) {
         const gl = canvas.getContext("webgl2", { preserveDrawingBuffer: true });
         if (gl === null) throw new Error("no WebGL 2");
         this.single = gl.getExtension("EXT_color_buffer_float") !== null;
         if (!this.single && gl.getExtension("EXT_color_buffer_half_float") === null) throw new Error("no WebGL 2 with floats");
+        const told = gl.getExtension("WEBGL_debug_renderer_info");
+        this.slow = told !== null && /swiftshader|llvmpipe|software/i.test(gl.getParameter(told.UNMASKED_RENDERER_WEBGL));
         this.gl = gl;
         this.canvas = canvas;
     }
@@ -44,7 +46,7 @@ class Gpu {
         const uniforms = new Map();
         for (let k = 0; k < gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); ++k) {
             const { name, type } = gl.getActiveUniform(program, k);
-            uniforms.set(name, { type, place: gl.getUniformLocation(program, name) });
+            uniforms.set(name.replace("[0]", ""), { type, place: gl.getUniformLocation(program, name) });
         }
         return { program, uniforms };
     }
@@ -89,7 +91,7 @@ class Gpu {
             } else if (type === gl.FLOAT_VEC3) gl.uniform3fv(place, value);
             else if (type === gl.FLOAT_MAT3) gl.uniformMatrix3fv(place, false, value);
             else if (type === gl.INT) gl.uniform1i(place, value);
-            else gl.uniform1f(place, value);
+            else gl.uniform1fv(place, [value].flat());
         }
         gl.drawArrays(gl.TRIANGLES, 0, 3);
     }
