@@ -1,4 +1,4 @@
-"""The public names: all there, listed by stage in the README, none of them a wing's."""
+"""The public names: all there, listed by stage in the page of the library, none of them a wing's."""
 
 import re
 from pathlib import Path
@@ -23,8 +23,8 @@ def test_no_public_name_is_a_wings() -> None:
     assert not wings & NAMES
 
 
-def test_the_readme_lists_them_all() -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+def test_the_library_page_lists_them_all() -> None:
+    text = (ROOT / "docs" / "library.md").read_text(encoding="utf-8")
     section = text.partition("## Public names")[2].partition("\n## ")[0]
     listed = {name for name in re.findall(r"`(\w+)`", section) if name != "fitmat"}
     assert listed == NAMES
