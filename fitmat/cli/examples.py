@@ -47,10 +47,12 @@ LABS = (
 )
 
 EXPORT = (
-    "Written to --out for glsl: NAME.glsl, the function vec3 brdf(vec3 wi, vec3 wo) to paste; NAME.vert and NAME.frag, "
-    "which light with it; for mitsuba: NAME.py, the dictionary, and NAME.xml, a scene to include; for table: "
-    "NAME.csv, NAME.parquet and NAME.json; for merl: NAME.binary. With them export.json, the values and how far "
-    "the target's are from the model's.\n\n"
+    "Written to --out, with export.json, the values and how far the target's are from the model's:\n\n"
+    "  glsl: NAME.glsl, the function vec3 brdf(vec3 wi, vec3 wo) to paste; NAME.vert, NAME.frag, which light with it\n\n"
+    "  mitsuba: NAME.py, the dictionary; NAME.xml, a scene to include\n\n"
+    "  gltf: NAME.gltf, the closest material that it can hold\n\n"
+    "  table: NAME.csv, NAME.parquet, NAME.json\n\n"
+    "  merl: NAME.binary\n\n"
     "Examples:\n\n"
     "  fitmat export run1 --to glsl\n\n"
     "  fitmat export run1 --to mitsuba --model lambert+ggx --name 'satin plastic' --out mine\n\n"

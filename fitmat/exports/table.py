@@ -36,7 +36,7 @@ MOST_ROWS = 5_000_000
 AZIMUTHS = 12
 """Azimuths of incidence over half a turn, of which a MERL file holds the mean."""
 
-READER = "fitmat's own reader"
+READER, LOOKUP = "fitmat's own reader", "the nearest cell, as BRDFRead.cpp does,"
 
 
 def measured(chosen: Chosen, theta_i: ArrayLike | None = None, step: float | None = None) -> Measurements:
@@ -95,7 +95,8 @@ def difference(chosen: Chosen, table: Measurements) -> Difference:
         back = read(file)
     own = evaluate(chosen.model, *exact(back.wi, back.wo))
     found = compared(back.value, own, back.wi, back.wo, READER)
-    return dataclasses.replace(found, over="those of the table; between them whoever reads it interpolates")
+    over = "those of the table; between them whoever reads it interpolates"
+    return dataclasses.replace(found, over=over, how="Read back by")
 
 
 def in_cells(chosen: Chosen) -> Measurements:
@@ -146,4 +147,5 @@ def looked_up(chosen: Chosen, cells: Measurements) -> Difference:
     filled[merl.cells(cells.wi, cells.wo)[0]] = cells.value
     below = (wi[:, 2] <= 0.0) | (wo[:, 2] <= 0.0)
     found = np.where(below[:, None], 0.0, filled[merl.cells(wi, wo)[0]])
-    return compared(found, evaluate(chosen.model, *exact(wi, wo)), wi, wo, "MERL's lookup, the nearest cell")
+    apart = compared(found, evaluate(chosen.model, *exact(wi, wo)), wi, wo, LOOKUP)
+    return dataclasses.replace(apart, how="Looked up in")

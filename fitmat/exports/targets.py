@@ -6,7 +6,7 @@ It writes nothing itself.
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from fitmat.exports import mitsuba, shaders, table, translation, verification
+from fitmat.exports import gltf, mitsuba, shaders, table, translation, verification
 from fitmat.exports.material import Chosen
 from fitmat.exports.verification import Difference
 
@@ -57,6 +57,7 @@ TARGETS = {
         lambda chosen, plugin: mitsuba.difference(chosen.model, plugin),
         lambda chosen, plugin: mitsuba.notes(chosen.model),
     ),
+    "gltf": Target("glTF 2.0", gltf.translated, gltf.texts, gltf.difference, gltf.notes, lambda found: found.facts),
     "table": Target("a table of angles", table.measured, table.texts, table.difference, gridded=True),
     "merl": Target("a MERL file", table.in_cells, table.file, table.looked_up, table.notes),
 }

@@ -53,6 +53,7 @@ class Difference:
         beyond: How many of them are further apart than `TOLERANCE`.
         executor: Program and version.
         over: Which directions these are.
+        how: What the executor did.
     """
 
     largest: float
@@ -64,6 +65,7 @@ class Difference:
     beyond: int
     executor: str
     over: str = "grazing and mirror peak included"
+    how: str = "Executed in"
 
     __repr__ = brief
 
@@ -72,7 +74,7 @@ class Difference:
         """The same in two sentences, each on a line."""
         place = f"theta_i {self.theta_i_deg:.1f}, theta_o {self.theta_o_deg:.1f}, phi {self.phi_deg:.0f} degrees"
         return (
-            f"Executed in {self.executor} over {self.count} directions, {self.over}.\n"
+            f"{self.how} {self.executor} over {self.count} directions, {self.over}.\n"
             f"Relative difference from the model at most {self.largest:.1e} ({place}), {self.mean:.1e} on average."
         )
 

@@ -114,7 +114,7 @@ def imitate(
     arguments.choice("metric", metric, LEAST_SQUARES)
     source = surface(what.model if isinstance(what, Fit) else what)
     template, moved = _template(source, into, dict(fixed or {}))
-    rows = _rows(source, metric)
+    rows = quadrature(source, metric)
     nodes = _nodes(template, moved.index, float(widths(source, vector(source)[None])[0]))
     found = _solve(template, rows, _started(template, nodes, moved, rows, metric), moved)
     ends, square, converged = (np.asarray(part) for part in found)
@@ -200,7 +200,7 @@ def _started(
         lit[np.arange(1, len(lit)), places] = 1.0
         f = values(template, lit, rows.wi, rows.wo)
         offset, scale = f[0], rows.root * slope
-        columns = ((f[1:] - offset) * scale).reshape(len(places), -1)
+        columns = ((f[1:] - offset) * scale).reshape(len(places), offset.size)
         start = lit[0]
         if len(places):
             weights = nonnegative(columns @ columns.T, columns @ ((rows.value - offset) * scale).ravel())
@@ -235,7 +235,7 @@ def _solve(
     return mapped(refined, jnp.asarray(starts))
 
 
-def _rows(source: AbstractBRDF, metric: str) -> Target:
+def quadrature(source: AbstractBRDF, metric: str) -> Target:
     """The quadrature, dense where the imitated lobe is."""
     theta, solid = incidence_panels()
     width = float(widths(source, vector(source)[None])[0])
