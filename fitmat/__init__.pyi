@@ -58,4 +58,5 @@ from .exports.export import export as export
 # Report
 from .reports.page import report as report
 from .reports import plot as plot
+from .reports.portrait import render as render
 from .errors import FitmatError as FitmatError

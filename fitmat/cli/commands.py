@@ -50,6 +50,16 @@ from fitmat.cli.flags.instrument import instrument
 from fitmat.cli.flags.labs import LaboratoriesFlag, SurfaceFlag
 from fitmat.cli.flags.models import CheckFlag, NameFlag
 from fitmat.cli.flags.reading import reading
+from fitmat.cli.flags.render import (
+    ExposureFlag,
+    HdrFlag,
+    LightFlag,
+    PicturedFlag,
+    PictureFlag,
+    PictureSetFlag,
+    ReplacePictureFlag,
+    SizeFlag,
+)
 from fitmat.cli.flags.simulate import (
     CatalogueFlag,
     FloorFlag,
@@ -236,6 +246,29 @@ def export(
     options = {"strict": strict, "verify": not no_verify, "force": force}
     options |= {"model": model, "name": name} | export.grid(theta_i, step)
     process.say(str(export.written(result, to, out, **options)))
+
+
+@app.command(cls=Command, epilog=examples.RENDER)
+def render(
+    what: PicturedFlag,
+    out: PictureFlag = Path("ball.png"),
+    set_: PictureSetFlag = None,
+    masking: MaskingFlag = None,
+    model: OneModelFlag = None,
+    light: LightFlag = None,
+    size: SizeFlag = 256,
+    exposure: ExposureFlag = None,
+    hdr: HdrFlag = False,
+    force: ReplacePictureFlag = False,
+) -> None:
+    """Draw a material on a ball under lights, from our own values: a fitted one, or a model of given values."""
+    process.set_up()
+    from fitmat.cli import render
+
+    render.refuse(out, hdr=hdr, force=force)
+    found = render.drawn(what, set_ or [], masking, light or [], model=model, size=size, exposure=exposure)
+    written = found.save(out, hdr=hdr)
+    process.say("\n".join([str(found), *(visible(str(path)) for path in written)]))
 
 
 @app.command(cls=Command)

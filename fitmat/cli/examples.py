@@ -46,6 +46,13 @@ LABS = (
     "  fitmat labs a.csv b.csv --model lambert+beckmann --calibration 0.03 --angle-error 0.1 --json"
 )
 
+RENDER = (
+    "A ball, seen from far away: no shadow, no light is reflected twice. The background is transparent.\n\n"
+    "Examples:\n\n"
+    "  fitmat render run1 --out ball.png\n\n"
+    "  fitmat render ggx-conductor --set alpha=0.2 --set eta=0.18,0.42,1.37 --set kappa=3.42,2.35,1.77 --light 60,150"
+)
+
 EXPORT = (
     "Written to --out, with export.json, the values and how far the target's are from the model's:\n\n"
     "  glsl: NAME.glsl, the function vec3 brdf(vec3 wi, vec3 wo) to paste; NAME.vert and NAME.frag, lit with it\n\n"

@@ -11,7 +11,7 @@ with its x axis along the parallels about the vertical axis y, as if turned on a
 import dataclasses
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from fitmat.maths.directions import zenith
 from fitmat.maths.quadrature import Rule, facets, gauss, lobe_rule
@@ -83,6 +83,52 @@ def reach(theta: Float[np.ndarray, "..."], half: float) -> Float[np.ndarray, "..
     """
     most = (np.cos(theta) * np.cos(half) - GRAZING) / np.maximum(np.sin(theta) * np.sin(half), 1e-300)
     return np.arcsin(np.clip(most, 0.0, 1.0))
+
+
+SUBPIXELS = 4
+"""A pixel of a picture is the mean of so many by so many points."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Raster:
+    """The points of a square picture that see the sphere, `SUBPIXELS` by `SUBPIXELS` for each pixel, rows from the top.
+
+    Attributes:
+        size: Pixels along a side.
+        inside: Which points, (SUBPIXELS size, SUBPIXELS size).
+        normals: Of the sphere at these, in the viewer's axes, (m, 3).
+    """
+
+    size: int
+    inside: Bool[np.ndarray, "k k"]
+    normals: Float[np.ndarray, "m 3"]
+
+    __repr__ = brief
+
+    @property
+    def opacity(self) -> Float[np.ndarray, "h w"]:
+        """Share of each pixel that sees the sphere."""
+        return self._summed(np.ones((len(self.normals), 1)))[..., 0] / SUBPIXELS**2
+
+    def mean(self, values: Float[np.ndarray, "m c"]) -> Float[np.ndarray, "h w c"]:
+        """Of each pixel over its points that see the sphere; NaN where none does."""
+        count = self.opacity[..., None] * SUBPIXELS**2
+        return np.where(count > 0, self._summed(values) / np.maximum(count, 1.0), np.nan)
+
+    def _summed(self, values: Float[np.ndarray, "m c"]) -> Float[np.ndarray, "h w c"]:
+        every = np.zeros((*self.inside.shape, values.shape[1]))
+        every[self.inside] = values
+        return every.reshape(self.size, SUBPIXELS, self.size, SUBPIXELS, -1).sum(axis=(1, 3))
+
+
+def raster(size: int) -> Raster:
+    """The points of a picture that the sphere fills but for its rim, see `GRAZING`."""
+    count = size * SUBPIXELS
+    middle = (np.arange(count) + 0.5) * 2.0 / count - 1.0
+    x, y = np.meshgrid(middle, -middle)
+    inside = x * x + y * y < 1.0 - GRAZING**2
+    x, y = x[inside], y[inside]
+    return Raster(size, inside, np.stack([x, y, np.sqrt(1.0 - x * x - y * y)], axis=1))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -179,7 +225,7 @@ def lit(width: float, angle: float, azimuth: float, *, isotropic: bool) -> Lit:
     return Lit(screen, surface @ frame(2.0 * half, turn)[2], surface[:, :, 2])
 
 
-def surrounded(width: float, *, isotropic: bool) -> Surrounded:
+def surrounded(width: float, *, isotropic: bool, finer: int = 1) -> Surrounded:
     """Rings of pixels with a rule over the light that is dense around each pixel's mirror direction.
 
     The rule of `quadrature.lobe_rule` around the viewer gives the directions to the light. The models of isotropic
@@ -188,8 +234,9 @@ def surrounded(width: float, *, isotropic: bool) -> Surrounded:
     Args:
         width: Slope-like width of the narrowest lobe.
         isotropic: Whether both models are.
+        finer: How many times as many rings, and pixels on each.
     """
-    count, pixels = (SKY_RINGS, SKY_PIXELS) if isotropic else (COARSE_RINGS, COARSE_PIXELS)
+    count, pixels = (finer * n for n in ((SKY_RINGS, SKY_PIXELS) if isotropic else (COARSE_RINGS, COARSE_PIXELS)))
     nodes, weights = gauss(count)
     square = 1.0 - GRAZING**2
     rings, along = np.arcsin(np.sqrt(square * (nodes + 1.0) / 2.0)), (2.0 * np.arange(pixels) + 1.0) / pixels - 1.0

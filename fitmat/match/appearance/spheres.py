@@ -14,7 +14,7 @@ from jaxtyping import Float
 
 from fitmat.match.appearance import scene
 from fitmat.match.appearance.colour import colouring, delta_e_2000, delta_e_itp, shown, to_srgb
-from fitmat.match.appearance.scene import Screen
+from fitmat.match.appearance.scene import Raster, Screen
 from fitmat.match.distances import PairedDraws
 from fitmat.maths.directions import zenith
 from fitmat.models.base import AbstractBRDF
@@ -36,8 +36,8 @@ Paravina et al. 2015 (J. Esthet. Restor. Dent. 27): half of the observers see 0.
 that 1 is just noticeable (ITU-R BT.2124).
 """
 
-SIZE, SUBPIXELS = 72, 4
-"""Pictures are so many pixels wide, each the mean of so many by so many points."""
+SIZE = 72
+"""Pictures are so many pixels wide."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -187,17 +187,19 @@ def _rendered(
     isotropic = all(model.isotropic for model, _ in pair)
     spots = [scene.lit(width, *where, isotropic=isotropic) for where in scene.LIGHTS.values()]
     around = scene.surrounded(width, isotropic=isotropic)
-    found = [np.stack([_lit(part, spot, weights) for part in pair], axis=1) for spot in spots]
-    sky = np.stack([_surrounded(part, around, weights) for part in pair], axis=1)
+    found = [np.stack([under_light(part, spot.wi, spot.wo, weights) for part in pair], axis=1) for spot in spots]
+    sky = np.stack([under_sky(part, around, weights) for part in pair], axis=1)
     return [*(spot.screen for spot in spots), around.screen], [*found, sky]
 
 
-def _lit(part: Draws, spot: scene.Lit, weights: Float[np.ndarray, "c 3"]) -> Float[np.ndarray, "d m 3"]:
-    """XYZ radiances of every draw in a light of one direction."""
-    return _coloured(values(*part, spot.wi, spot.wo), weights) * spot.wi[:, 2:]
+def under_light(
+    part: Draws, wi: Float[np.ndarray, "m 3"], wo: Float[np.ndarray, "m 3"], weights: Float[np.ndarray, "c 3"]
+) -> Float[np.ndarray, "d m 3"]:
+    """XYZ radiances of every draw in a light of one direction, of irradiance 1 on a surface that faces it."""
+    return _coloured(values(*part, wi, wo), weights) * wi[:, 2:]
 
 
-def _surrounded(part: Draws, around: scene.Surrounded, weights: Float[np.ndarray, "c 3"]) -> Float[np.ndarray, "d m 3"]:
+def under_sky(part: Draws, around: scene.Surrounded, weights: Float[np.ndarray, "c 3"]) -> Float[np.ndarray, "d m 3"]:
     """XYZ radiances of every draw in the environment."""
     found = np.zeros((len(part[1]), *around.light.shape[:2], 3))
     for rows, k, (f,) in blocks([part], list(zip(around.wi, around.wo, strict=True))):
@@ -229,7 +231,7 @@ def _lighting(
 
 
 def _both(screen: Screen, one: Float[np.ndarray, "m 3"], other: Float[np.ndarray, "m 3"]) -> Pictures:
-    drawn = _pictures(screen, np.concatenate([one, other], axis=1))
+    drawn = pictured(screen, np.concatenate([one, other], axis=1), scene.raster(SIZE))
     one, other = drawn[..., :3], drawn[..., 3:]
     return Pictures(to_srgb(one), to_srgb(other), delta_e_2000(shown(one), shown(other)))
 
@@ -245,27 +247,22 @@ def _spread(delta: Float[np.ndarray, "d m"], share: Float[np.ndarray, " m"]) -> 
     return Spread(estimate(delta @ share), estimate(twentieth), estimate(ranked[:, -1]))
 
 
-def _pictures(screen: Screen, values: Float[np.ndarray, "m k"]) -> Float[np.ndarray, "h w k"]:
-    """Values between the pixels by linear interpolation, averaged over the points of each pixel of the picture."""
+def pictured(screen: Screen, values: Float[np.ndarray, "m k"], raster: Raster) -> Float[np.ndarray, "h w k"]:
+    """Values of a screen's pixels as a picture: between them by linear interpolation; NaN beside the sphere."""
     from scipy.ndimage import map_coordinates
 
-    count = SIZE * SUBPIXELS
-    middle = (np.arange(count) + 0.5) * 2.0 / count - 1.0
-    x, y = np.meshgrid(middle, -middle)
-    inside = x * x + y * y < 1.0 - scene.GRAZING**2
-    x, y = x[inside], y[inside]
-    normals = np.stack([x, y, np.sqrt(1.0 - x * x - y * y)], axis=1) @ np.asarray(screen.axes).T
+    normals = raster.normals @ np.asarray(screen.axes).T
     theta, turn = zenith(normals), np.arctan2(normals[:, 1], normals[:, 0])
     along = (np.abs(turn) - np.pi / 2) / np.maximum(scene.reach(theta, screen.half), 1e-9)
     ends = np.asarray(screen.along)
     ends = np.r_[-2.0 - ends[0], ends, 2.0 - ends[-1]]  # the next pixel is on the other side of the meridian
     grid = values.reshape(*screen.area.shape, -1)
     grid = np.concatenate([grid[:, ::-1, :1], grid, grid[:, ::-1, -1:]], axis=2)
-    at = np.stack([np.interp(theta, screen.rings, np.arange(len(grid))), np.interp(along, ends, np.arange(len(ends)))])
-    found = np.zeros((count, count, grid.shape[3] + 1))
+    middle = np.broadcast_to(grid[:1].mean(axis=(1, 2), keepdims=True), grid[:1].shape)
+    grid, rings = np.concatenate([middle, grid]), np.r_[0.0, screen.rings]
+    at = np.stack([np.interp(theta, rings, np.arange(len(rings))), np.interp(along, ends, np.arange(len(ends)))])
+    found = np.zeros((len(normals), grid.shape[3]))
     for k in range(grid.shape[3]):
         sides = [map_coordinates(grid[:, side, :, k], at, order=1, mode="nearest") for side in (0, -1)]
-        found[inside, k] = np.where(np.abs(along) <= 1.0, np.where(turn >= 0.0, *sides), 0.0)
-    found[inside, -1] = 1.0
-    total = found.reshape(SIZE, SUBPIXELS, SIZE, SUBPIXELS, -1).sum(axis=(1, 3))
-    return np.where(total[..., -1:] > 0, total[..., :-1] / np.maximum(total[..., -1:], 1.0), np.nan)
+        found[:, k] = np.where(np.abs(along) <= 1.0, np.where(turn >= 0.0, *sides), 0.0)
+    return raster.mean(found)
