@@ -28,6 +28,7 @@ from fitmat.cli.flags.files import (
     OutFlag,
     PlotFlag,
     ReplaceFlag,
+    ReplacePageFlag,
     ReplacePlotFlag,
     files,
 )
@@ -91,8 +92,8 @@ app = typer.Typer(
     help="Turn measured reflectance into a material you can trust: fitted BRDF models, honest uncertainties, and how "
     "closely the empirical Phong model matches the microfacet model.\n\n"
     "Exit codes: 0 all fits converged; 1 wrong input; 2 wrong usage; 3 a fit ended otherwise (the report is written); "
-    "130 stopped with Ctrl-C before there was anything to report. A picture of the report that "
-    "cannot be drawn is said and changes none of these: the numbers are saved first.",
+    "130 stopped with Ctrl-C before there was anything to report. A page that cannot be "
+    "made is said and changes none of these: the numbers are saved first.",
 )
 
 
@@ -224,6 +225,19 @@ def convert(
     from fitmat.cli import convert
 
     process.say("\n".join([*convert.written(files, reading, out, force=force), visible(str(out))]))
+
+
+@app.command(cls=Command)
+def report(
+    result: ResultFlag,
+    force: ReplacePageFlag = False,
+) -> None:
+    """Make the page of a run again from what it left on disk, as after an update of fitmat."""
+    process.set_up()
+    from fitmat.reports import page
+    from fitmat.studies.result import load
+
+    process.say(visible(str(page.report(load(result), force=force))))
 
 
 @app.command(cls=Command, epilog=examples.EXPORT)

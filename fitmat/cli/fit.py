@@ -3,6 +3,7 @@
 It computes nothing itself.
 """
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -43,10 +44,11 @@ class Report(NamedTuple):
             as_json: Whether as the record that was written; else as a person reads it.
         """
         record, shown = self.folder / RECORD, self.folder / page.PAGE
+        text = record.read_text(encoding="utf-8")
         if as_json:
-            process.say(record.read_text(encoding="utf-8").rstrip("\n"))
+            process.say(text.rstrip("\n"))
         else:
-            terminal.show(self.study, shown if shown.exists() else record)
+            terminal.show(json.loads(text), shown if shown.exists() else record)
         if self.missing:
             process.say(f"{self.folder}: {self.missing}", err=True)
         if (kept := program_files.kept()).why:
@@ -91,7 +93,7 @@ def write_report(
         page.load_ahead()
         found = study(measurements, resume=files.resumed(target), progress=watch, **told)
         watch("writing the report", 0, 0)
-        missing = page.write(written, found)
+        missing = page.write(written, found, process.command())
     if told["sampling"]:
         forget(files.resumed(target))
     return Report(target, found, missing)

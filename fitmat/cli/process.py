@@ -13,7 +13,7 @@ from typing import IO, Any, NoReturn
 import typer
 
 from fitmat.errors import FitmatError
-from fitmat.text import visible
+from fitmat.text import for_shell, visible
 
 WRONG_INPUT, NOBODY_READS = 1, 141
 """Exit codes after wrong input, and where nobody reads the output to its end: 128 + SIGPIPE, as shells count."""
@@ -52,6 +52,11 @@ def silence(place: int) -> None:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, place)
     os.close(nowhere)
+
+
+def command() -> str:
+    """What was typed, quoted as a shell takes it."""
+    return " ".join(["fitmat", *map(for_shell, sys.argv[1:])])
 
 
 def refuse_little_memory() -> None:

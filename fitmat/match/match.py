@@ -134,6 +134,13 @@ class Match:
         low, high = np.rad2deg(incidence_range(m.wi, np.any(m.valid, axis=1)))
         return float(low), float(high)
 
+    @property
+    def serves_up_to_deg(self) -> float | None:
+        """The incidence up to which, from 0° on, the best fits differ moderately at most; None where they never do."""
+        alike = self.distances.by_incidence["relative"][1] < SIMILAR
+        count = len(alike) if alike.all() else int(np.argmin(alike))
+        return float(np.rad2deg(self.distances.theta_i[count - 1])) if count else None
+
     def _cautions(self, names: tuple[str, str]) -> list[str]:
         """What is impossible, undetermined or unfinished."""
         sentences = []

@@ -1,19 +1,57 @@
-"""What a person at a terminal sees when a study is done.
+"""What a person at a terminal sees when a study is done: the answer, the parameters, the doubts, the place.
 
-It computes nothing and writes to stdout only.
+It computes nothing, says what the page says, and writes to stdout only.
 """
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from fitmat.fitting.concluding import RESULTS
 from fitmat.reports.rows import parameter_rows
-from fitmat.studies.findings import Findings
-from fitmat.studies.study import MOST_SAMPLED, Study
+from fitmat.studies.cards import BAD, CAUTION, GOOD, UNKNOWN, cards
 from fitmat.text import visible
+
+Record = Mapping[str, Any]
+"""JSON types of `studies.record.to_dict`, or a part of it."""
+
+MARKS = {GOOD: ("✔", "green"), CAUTION: ("▲", "yellow"), BAD: ("✖", "red"), UNKNOWN: ("?", "cyan")}
+"""Level of a card → its mark, and its colour on a terminal."""
+
+SHOWN = 4
+"""Of more models than this, only the first of the choice have their parameters shown."""
+
+
+def show(record: Record, report: Path, screen: Console | None = None) -> None:
+    """Print the three answers, the parameters of every model, what speaks against them and where the report is.
+
+    Args:
+        record: What was found.
+        report: The page, or the record where there is no page.
+        screen: Where to; stdout if None.
+    """
+    out = screen or Console()
+    channels = f", channels {', '.join(record['channels'])}" if len(record["channels"]) > 1 else ""
+    _say(out, f"{record['file']}: {record['n_samples']} samples{channels}\n")
+    for card in cards(record):
+        mark, style = MARKS[card.level]
+        _say(out, (f"{mark} {card.title}", f"bold {style}"), f"  {card.sentence}")
+    shown = _shown(record)
+    for fit in shown:
+        _say(out, (f"\n{_title(fit)}", "bold"))
+        out.print(_table(fit, record["channels"]))
+        if fit["identifiability"] is not None:
+            _say(out, fit["identifiability"]["words"])
+    _say(out, ("→ follows from the parameters above it", "dim"))
+    if len(shown) < len(record["fits"]):
+        _say(out, (f"{len(record['fits']) - len(shown)} more models: see the report.", "dim"))
+        if record["choice"] is not None:
+            _say(out, f"\n{record['choice']['verdict']}")
+    _doubts(out, record, shown)
+    out.print(Text(f"\nReport: {visible(str(report))}"), soft_wrap=True)
 
 
 def _say(out: Console, *parts: str | tuple[str, str]) -> None:
@@ -23,70 +61,51 @@ def _say(out: Console, *parts: str | tuple[str, str]) -> None:
     out.print(text, soft_wrap=not out.is_terminal or out.is_dumb_terminal)
 
 
-def show(found: Study, report: Path, screen: Console | None = None) -> None:
-    """Print the parameters of every model, what speaks against them, the verdict and where the report is.
-
-    Args:
-        found: What to show.
-        report: The page, or the record where there is no page.
-        screen: Where to; stdout if None.
-    """
-    out = screen or Console()
-    first = found.findings[0].fit
-    _say(out, str(first.measurements))
-    _say(out, first.noise.words)
-    for warning in found.warnings:
-        if warning not in first.measurements.warnings:  # which the measurements have said
-            _say(out, f"WARNING: {warning}")
-    if first.n_values > MOST_SAMPLED:
-        words = f"More than {MOST_SAMPLED:,} values: intervals from Laplace's approximation, nothing is sampled."
-        _say(out, words)
-    if not first.loss.posterior:
-        _say(out, f"The loss {first.loss.name} is an objective: single fits, without a posterior.")
-    shown = found.detailed
-    for one in shown:
-        _say(out, (f"\n{_title(one)}", "bold"))
-        out.print(_table(one))
-        _remark(out, one)
-    _say(out, ("\n→ follows from the parameters above it", "dim"))
-    if len(shown) < len(found.findings):
-        _say(out, (f"{len(found.findings) - len(shown)} more models: see the report.", "dim"))
-    verdicts = [] if found.choice is None or len(found.findings) == len(shown) else [found.choice.verdict]
-    adequate = " ".join(f"{one.name} {one.fit.adequacy}." for one in found.findings)
-    for words in (*verdicts, found.match.verdict if found.match else adequate):
-        _say(out, (f"\n{words}", "bold"))
-    out.print(Text(f"\nReport: {visible(str(report))}"), soft_wrap=True)
+def _shown(record: Record) -> list[Record]:
+    """The models whose parameters are printed: all of a few, else those of the match, then the best."""
+    fits = {fit["model"]: fit for fit in record["fits"]}
+    match, choice = record["match"], record["choice"]
+    first = [match["empirical"], match["microfacet"]] if match else []
+    ranked = [candidate["model"] for candidate in choice["candidates"]] if choice else []
+    chosen = list(dict.fromkeys((*first, *ranked, *fits)))[:SHOWN]
+    return [fit for name, fit in fits.items() if name in chosen]
 
 
-def _remark(out: Console, found: Findings) -> None:
-    """How a fit ended, what speaks against it, and what the angles determine."""
-    result, against = found.fit.result, found.doubts
-    if result != "converged":
-        _say(out, (result, "yellow"), f": {RESULTS[result]}")
-    if found.posterior.interrupted:
-        _say(out, ("interrupted", "yellow"), ": sampling was stopped; what was done is kept.")
-    if against.words:
-        _say(out, ("in doubt" if against.inadequate else "note", "yellow"), f": {against}")
-    for words in filter(None, (found.scope, found.several_facets)):
-        _say(out, words)
-    for said in (found.identifiability, found.second_opinion, found.budget):
-        if said is not None and said.words:
-            _say(out, said.words)
+def _doubts(out: Console, record: Record, shown: Sequence[Record]) -> None:
+    """What speaks against the data and the fits, then how the file was read."""
+    out.print()
+    for warning in record["warnings"]:
+        _say(out, ("WARNING", "yellow"), f": {warning}")
+    for fit in shown:
+        if fit["result"] != "converged":
+            _say(out, (fit["result"], "yellow"), f": {fit['result_means']}")
+        if fit["posterior"]["interrupted"]:
+            _say(out, ("interrupted", "yellow"), ": sampling was stopped; what was done is kept.")
+        if fit["doubts"]:
+            words = ("in doubt" if fit["inadequate"] else "note", "yellow")
+            _say(out, words, f": {' '.join(fit['doubts'])}")
+        if (opinion := fit["posterior"]["second_sampler"]) is not None:
+            _say(out, opinion["words"])
+    if not record["loss"]["posterior"]:
+        _say(out, f"The loss {record['loss']['name']} is an objective: single fits, without a posterior.")
+    masked = [f"{count} masked: {reason}." for reason, count in record["masked"].items()]
+    for words in (*masked, *record["notes"], record["noise"]):
+        _say(out, (words, "dim"))
 
 
-def _title(found: Findings) -> str:
-    posterior, fit = found.posterior, found.fit
-    agreeing = f"{fit.n_starts_agreeing} of {fit.n_starts} starts agree"
-    ending = f"posterior {posterior.verdict}" if fit.loss.posterior else f"loss {fit.loss.name}, no posterior"
-    against = "" if found.doubts.intervals_hold else ", intervals in doubt"
-    return f"{fit.name}: {fit.result}, {agreeing}, {ending}{against}"
+def _title(fit: Record) -> str:
+    agreeing = f"{fit['n_starts_agreeing']} of {fit['n_starts']} starts agree"
+    verdict = fit["posterior"]["verdict"]
+    ending = verdict if verdict == "no posterior" else f"posterior {verdict}"
+    against = "" if fit["intervals_hold"] else ", intervals in doubt"
+    return f"{fit['model']}: {fit['result']}, {agreeing}, {ending}{against}"
 
 
-def _table(found: Findings) -> Table:
+def _table(fit: Record, channels: Sequence[str]) -> Table:
     table = Table(box=None, pad_edge=False)
     for heading in ("parameter", "", "value ± sd", "95 % interval", ""):
         table.add_column(heading, no_wrap=True)
-    for row in parameter_rows(found):
+    for row in parameter_rows(fit, channels):
         name = f"→ {row['name']}" if row["kind"] == "follows" else row["name"]
         remark = " ".join(part for part in (row["unit"], row["remark"]) if part)
         table.add_row(*(Text(visible(cell)) for cell in (name, row["symbol"], row["value"], row["interval"], remark)))

@@ -3,30 +3,37 @@
 It computes nothing; numbers that are not finite become null.
 """
 
+import platform
 from importlib.metadata import version
 from typing import Any
 
 from fitmat.fitting.concluding import RESULTS
 from fitmat.fitting.quantities import UNDETERMINED, Quantity
+from fitmat.fitting.result import Fit
 from fitmat.judgement.budget import ALBEDO_DEG, COVERAGE, SOURCES, Budget, Line
 from fitmat.judgement.choice import Choice
 from fitmat.judgement.identifiability.verdicts import Identifiability
-from fitmat.match.appearance.spheres import Perceived, Spread
-from fitmat.match.match import Match
+from fitmat.judgement.predictive_check import PredictiveCheck
+from fitmat.studies import match_record
 from fitmat.studies.findings import Findings
 from fitmat.studies.result import FORMAT, masking
 from fitmat.studies.study import Study
 from fitmat.text import plain
-from fitmat.uncertainty.estimate import Estimate
 
 
-def to_dict(study: Study) -> dict[str, Any]:
-    """What the report holds, as JSON types; numbers that are not finite become null."""
+def to_dict(study: Study, command: str | None = None) -> dict[str, Any]:
+    """What the report holds, as JSON types; numbers that are not finite become null.
+
+    Args:
+        study: What was found.
+        command: By which it was asked for; None where it was not by one.
+    """
     m, first = study.measurements, study.findings[0].fit
     return plain(
         {
             "format": FORMAT,
             "fitmat": version("fitmat"),
+            "versions": {name: version(name) for name in ("jax", "numpy")} | {"Python": platform.python_version()},
             "file": m.source,
             "n_samples": study.n_samples,
             "n_masked": study.n_masked,
@@ -34,16 +41,35 @@ def to_dict(study: Study) -> dict[str, Any]:
             "notes": [*m.notes, *filter(None, [str(m.instrument)])],
             "noise": first.noise.words,
             "warnings": list(study.warnings),
-            "loss": {"name": first.loss.name, "formula": first.loss.formula, "posterior": first.loss.posterior},
+            "loss": _loss_dict(first),
             "channels": list(m.channels),
-            "fits": [_fit_dict(found) for found in study.findings],
+            "full": study.full,
+            "command": command,
+            "fits": [fit_dict(found) for found in study.findings],
             "choice": None if study.choice is None else _choice_dict(study.choice),
-            "match": None if study.match is None else _match_dict(study.match, study.distance),
+            "match": None if study.match is None else match_record.to_dict(study.match, _line(study)),
         }
     )
 
 
-def _fit_dict(found: Findings) -> dict[str, Any]:
+def _loss_dict(fit: Fit) -> dict[str, Any]:
+    loss, left = fit.loss, fit.measurements.n_valid - fit.n_values
+    words = f"{left} values left out: {loss.unusable}." if loss.usable is not None and left > 0 else ""
+    return {
+        "name": loss.name,
+        "formula": loss.formula,
+        "source": loss.source,
+        "posterior": loss.posterior,
+        "left_out": words,
+    }
+
+
+def _line(study: Study) -> dict[str, Any] | None:
+    return None if study.distance is None else _line_dict(study.distance)
+
+
+def fit_dict(found: Findings) -> dict[str, Any]:
+    """What the record holds of one model."""
     posterior, fit, d = found.posterior, found.fit, found.posterior.diagnostics
     channels, check, opinion = len(fit.measurements.channels), found.check, found.second_opinion
     diagnosed = {"ess_min": None, "tail_ess_min": None, "rhat_max": None, "tau_max": None}
@@ -58,7 +84,9 @@ def _fit_dict(found: Findings) -> dict[str, Any]:
         "result": fit.result,
         "result_means": RESULTS[fit.result],
         "adequacy": fit.adequacy,
+        "misfit_ratio": fit.misfit_ratio if fit.noise.known and fit.finite else None,
         "doubts": list(found.doubts.words),
+        "inadequate": found.doubts.inadequate,
         "intervals_hold": found.doubts.intervals_hold,
         "scope": found.scope,
         "several_facets": found.several_facets,
@@ -72,6 +100,7 @@ def _fit_dict(found: Findings) -> dict[str, Any]:
         "budget": None if found.budget is None else _budget_dict(found.budget),
         "identifiability": None if found.identifiability is None else _identified_dict(found.identifiability),
         "priors": dict(found.priors),
+        "learnt": [{"name": x.name, "prior": x.prior, "narrower": x.narrower} for x in found.learnt],
         "posterior": {
             "verdict": posterior.verdict,
             "interrupted": posterior.interrupted,
@@ -79,7 +108,7 @@ def _fit_dict(found: Findings) -> dict[str, Any]:
             **diagnosed,
             "second_sampler": None if opinion is None else {"verdict": opinion.verdict, "words": opinion.words},
         },
-        "predictive_check": None if check is None else {"failed": bool(check.failed), "words": check.words},
+        "predictive_check": None if check is None else _check_dict(check),
         "metrics": dict(found.metrics),
         "log_likelihood": fit.log_likelihood,
         "aicc": fit.aicc,
@@ -88,8 +117,33 @@ def _fit_dict(found: Findings) -> dict[str, Any]:
 
 
 def _identified_dict(found: Identifiability) -> dict[str, Any]:
-    states = {v.name: {"state": v.state, "ci95": list(v.ci95), "contraction": v.contraction} for v in found.verdicts}
+    states = {
+        v.name: {
+            "state": v.state,
+            "value": v.value,
+            "ci95": list(v.ci95),
+            "open": list(v.open),
+            "contraction": v.contraction,
+            "narrower": v.narrower,
+        }
+        for v in found.verdicts
+    }
     return {"words": found.words, "parameters": states}
+
+
+def _check_dict(found: PredictiveCheck) -> dict[str, Any]:
+    every = [
+        {
+            "name": s.name,
+            "place": s.place,
+            "observed": s.observed,
+            "expected": list(s.expected),
+            "p": s.p,
+            "surprising": s.surprising,
+        }
+        for s in found.statistics
+    ]
+    return {"failed": bool(found.failed), "words": found.words, "statistics": every}
 
 
 def _choice_dict(choice: Choice) -> dict[str, Any]:
@@ -99,8 +153,11 @@ def _choice_dict(choice: Choice) -> dict[str, Any]:
             "aicc": c.fit.aicc,
             "bic": c.fit.bic,
             "elpd": None if c.evidence is None else c.evidence.elpd,
+            "elpd_se": None if c.evidence is None else c.evidence.se,
+            "p_loo": None if c.evidence is None else c.evidence.p_loo,
             "behind": c.behind,
             "behind_se": c.behind_se,
+            "clearly_behind": c.clearly_behind,
             "left_out_error": None if c.left_out is None else c.left_out.error,
             "left_out_surprise": None if c.left_out is None else c.left_out.surprise,
             "broken_laws": list(c.broken),
@@ -116,7 +173,8 @@ def _quantity_dict(q: Quantity, channels: int) -> dict[str, Any]:
     """Scalars for shared quantities and single-channel files, else lists in channel order."""
     scalar = not q.per_channel or channels == 1
     value, sd, ci95, remark = ((a[0] if scalar else a) for a in (q.value, q.sd, q.ci95, q.remarks))
-    return {"value": value, "sd": sd, "ci95": ci95, "unit": q.unit, "symbol": q.symbol, "remark": remark}
+    told = {"value": value, "sd": sd, "ci95": ci95, "unit": q.unit, "symbol": q.symbol, "remark": remark, "doc": q.doc}
+    return told
 
 
 def _budget_dict(found: Budget) -> dict[str, Any]:
@@ -136,61 +194,8 @@ def _line_dict(line: Line) -> dict[str, Any]:
         "value": line.value,
         "unit": line.unit,
         "remark": line.remark,
+        "words": line.words,
         "parts": line.parts,
         "u": line.combined,
         "U": line.expanded,
-    }
-
-
-def _match_dict(match: Match, distance: Line | None) -> dict[str, Any]:
-    def estimate(e: Estimate | None) -> dict[str, Any] | None:
-        return None if e is None else {"value": e.value, "ci95": list(e.ci95) if e.has_interval else None}
-
-    return {
-        "empirical": match.empirical.fit.name,
-        "microfacet": match.microfacet.fit.name,
-        "hemisphere_distance": estimate(match.hemisphere_distance),
-        "measured_distance": estimate(match.measured_distance),
-        "cube_root_distance": estimate(match.cube_root_distance),
-        "albedo_gap_max": {
-            **(estimate(match.albedo_gap_max) or {}),
-            "theta_i_deg": match.albedo_gap_theta_i_deg,
-            "sign": match.albedo_gap_sign,
-        },
-        "implied_exponent": estimate(match.implied_exponent),
-        "fitted_exponent": estimate(match.fitted_exponent),
-        "fitted_alpha": estimate(match.fitted_alpha),
-        "implied_alpha": estimate(match.implied_alpha),
-        "width_ratio": estimate(match.width_ratio),
-        "delta_aicc": match.delta_aicc,
-        "delta_bic": match.delta_bic,
-        "distances": {
-            name: {
-                "all": estimate(whole),
-                "regions": {r: estimate(e) for r, e in match.distances.by_region[name].items()},
-                "share": {r: estimate(e) for r, e in match.distances.share[name].items()},
-            }
-            for name, whole in match.distances.whole.items()
-        },
-        "budget": None if distance is None else _line_dict(distance),
-        "cannot_be_told_apart_up_to_deg": match.telling.alike_up_to_deg,
-        "imitations": [
-            {"of": i.of, "by": i.model.name, "metric": i.metric, "parameters": i.parameters, "distance": i.distance}
-            for i in match.imitations
-        ],
-        "perceived": None if match.perceived is None else _perceived_dict(match.perceived),
-        "verdict": match.verdict,
-    }
-
-
-def _perceived_dict(seen: Perceived) -> dict[str, Any]:
-    def difference(found: Spread) -> dict[str, Any]:
-        parts = {"mean": found.mean, "worst_twentieth": found.worst_twentieth, "largest": found.largest}
-        return {name: {"value": e.value, "ci95": list(e.ci95)} for name, e in parts.items()}
-
-    return {
-        "words": seen.words,
-        "delta_e_2000": difference(seen.delta_e_2000),
-        "delta_e_itp": difference(seen.delta_e_itp),
-        "lightings": {x.name: {"delta_e_2000": difference(x.delta_e_2000)} for x in seen.lightings},
     }

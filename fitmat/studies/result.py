@@ -29,8 +29,11 @@ from fitmat.text import brief
 FORMAT = 1
 """Of the record; it grows when what an older one says would be misread."""
 
-RECORD, POSTERIOR = "fit.json", "posterior-{}.parquet"
-"""Files of a run: the record, and the draws of each model."""
+RECORD, POSTERIOR, FIGURES = "fit.json", "posterior-{}.parquet", "figures.json"
+"""Files of a run: the record, the draws of each model, and what a page draws."""
+
+DRAWN = 1
+"""Format of the figures; it grows when what older ones say would be misread."""
 
 FIXED = "fixed"
 """Remark on a parameter that was held."""
@@ -164,6 +167,26 @@ def load(folder: str | os.PathLike[str]) -> Result:
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         what = f"no {error}" if isinstance(error, KeyError) else _first_line(error)
         raise ReadError(f"{file} is damaged ({what}), expected what `fitmat fit` writes. Fit again.") from error
+
+
+def drawn(result: Result) -> dict[str, Any]:
+    """What a page draws of a run.
+
+    Raises:
+        ReadError: it is not there, is damaged, or of another format than this version's.
+    """
+    file = result.file.with_name(FIGURES)
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+        got = found["format"]
+    except OSError as error:
+        why = f"{error.strerror or error}; the run is older than pages that can be made again"
+        raise ReadError(f"{file}: {why}. Fit again.") from error
+    except (ValueError, RecursionError, LookupError, TypeError) as error:
+        raise ReadError(f"{file} is damaged ({_first_line(error)}), expected what is drawn. Fit again.") from error
+    if got != DRAWN:
+        raise ReadError(f"{file} is of format {json.dumps(got)[:20]}, expected {DRAWN}. Fit again with this version.")
+    return found
 
 
 def masking(model: AbstractBRDF) -> str | None:

@@ -3,6 +3,7 @@
 import dataclasses
 import io
 import signal
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ import fitmat
 from fitmat.cli import session
 from fitmat.models.simulation import simulate
 from fitmat.reports import terminal
+from fitmat.studies import record
+from fitmat.studies.cards import cards
 from fitmat.studies.findings import find
 from fitmat.studies.study import Study
 from fitmat.uncertainty.laplace import laplace_each
@@ -26,6 +29,11 @@ def posterior() -> Posterior:
     return laplace_each(made, {"lambert+ggx": {}}, seed=0)[0]
 
 
+def told(posterior: Posterior) -> dict[str, Any]:
+    """The record of a study of one model."""
+    return record.to_dict(Study((find(posterior, ()),)))
+
+
 @pytest.fixture(autouse=True)
 def narrow(monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
@@ -34,7 +42,7 @@ def narrow(monkeypatch):
 def test_show_fits_80_columns(posterior, tmp_path):
     written = io.StringIO()
     screen = Console(file=written, width=80, force_terminal=True, color_system=None)
-    terminal.show(Study((find(posterior, ()),)), tmp_path / "report.html", screen)
+    terminal.show(told(posterior), tmp_path / "report.html", screen)
     out = written.getvalue()
     lines = out.splitlines()
     assert max(map(len, (line for line in lines if str(tmp_path) not in line))) <= 80
@@ -48,15 +56,28 @@ def test_show_fits_80_columns(posterior, tmp_path):
 def test_nothing_is_wrapped_where_there_is_no_terminal(posterior, capsys, tmp_path):
     """Sentences stay whole for whoever searches them, however narrow the window."""
     found = find(posterior, ())
-    terminal.show(Study((found,)), tmp_path)
+    terminal.show(record.to_dict(Study((found,))), tmp_path)
     lines = capsys.readouterr().out.splitlines()
-    assert str(found.fit.measurements).splitlines()[-1] in lines
+    (card, *_) = cards(record.to_dict(Study((found,))))
+    assert any(line.endswith(card.sentence) for line in lines)
     assert found.fit.noise.words in lines
+
+
+def test_the_answer_comes_first_then_parameters_doubts_and_the_path(posterior, capsys, tmp_path):
+    """The sentences are those of the page."""
+    found = told(posterior)
+    found["warnings"] = ["something is odd."]
+    terminal.show(found, tmp_path / "report.html")
+    out = capsys.readouterr().out
+    marks = [f"{card.title}  {card.sentence}" for card in cards(found)]
+    marks += ["lambert+ggx: converged", "WARNING: something is odd.", f"Report: {tmp_path}"]
+    places = [out.index(mark) for mark in marks]
+    assert places == sorted(places)
 
 
 def test_show_names_the_outcome(posterior, capsys, tmp_path):
     fit = dataclasses.replace(posterior.fit, result="unidentifiable", undetermined=("eta",))
-    terminal.show(Study((find(dataclasses.replace(posterior, fit=fit, interrupted=True), ()),)), tmp_path)
+    terminal.show(told(dataclasses.replace(posterior, fit=fit, interrupted=True)), tmp_path)
     out = capsys.readouterr().out
     assert "unidentifiable: At least one parameter is not determined" in out
     assert "interrupted: sampling was stopped" in out
@@ -66,7 +87,7 @@ def test_show_names_the_outcome(posterior, capsys, tmp_path):
 def test_brackets_in_names_are_text(posterior, capsys, tmp_path):
     measurements = dataclasses.replace(posterior.fit.measurements, source="[red]x.csv", channels=("[bold]", "g", "b"))
     fit = dataclasses.replace(posterior.fit, measurements=measurements)
-    terminal.show(Study((find(dataclasses.replace(posterior, fit=fit), ()),)), tmp_path / "[dim]" / "report.html")
+    terminal.show(told(dataclasses.replace(posterior, fit=fit)), tmp_path / "[dim]" / "report.html")
     out = capsys.readouterr().out
     assert all(text in out for text in ("[red]x.csv", "kd [bold]", "[dim]/report.html"))
 

@@ -1,10 +1,8 @@
 """The match: distances by hand and by brute force in numpy, the words of the verdict, the metrics of the literature."""
 
 import dataclasses
-from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 import pytest
 from oracles import ggx
@@ -14,16 +12,15 @@ from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
 from fitmat.judgement.fit_metrics import fit_metrics
 from fitmat.match import sentences
-from fitmat.match.ablation import EXPLAINS, TERMS, Ablation
+from fitmat.match.ablation import Ablation
 from fitmat.match.discernibility import SEPARATED, Telling
-from fitmat.match.distances import METRICS
 from fitmat.match.imitation import Imitation
 from fitmat.match.match import ALBEDO_ANGLES, IMITATED, Match, compare
-from fitmat.match.regions import GRAZING_DEG, REGIONS
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha, fitted_alpha, fitted_exponent
-from fitmat.reports import page as report
 from fitmat.reports import plot
+from fitmat.studies import match_record
+from fitmat.text import plain
 from fitmat.uncertainty.estimate import Estimate
 from fitmat.uncertainty.posterior import Posterior
 
@@ -327,33 +324,36 @@ def test_the_pictures_show_the_numbers(match: Match) -> None:
 
 
 @pytest.mark.parametrize("known", [True, False])
-def test_the_page_tells_the_match_in_words(match: Match, known: bool) -> None:
-    """Every variable is there, and the sentences say what the numbers do."""
-    folder = jinja2.FileSystemLoader(Path(report.__file__).with_name("templates"))
-    environment = jinja2.Environment(loader=folder, autoescape=True, undefined=jinja2.StrictUndefined)
-    environment.filters["picture"] = lambda figure, words: str(figure)
+def test_the_record_of_a_match_holds_what_is_said(match: Match, known: bool) -> None:
+    """Of causes and of the instrument only what is known; each imitation in each metric."""
     telling = dataclasses.replace(match.telling, known=known)
     fits = match.empirical.fit, match.microfacet.fit
     both = [imitated(fits[1 - k].model, fits[k].model, metric) for k in (0, 1) for metric in IMITATED]
     ablation = match.ablation if known else None
     one = dataclasses.replace(match, telling=telling, ablation=ablation, imitations=tuple(both))
-    page = environment.get_template("match.html").render(
-        match=one,
-        regions=REGIONS,
-        metrics_of_match=METRICS,
-        terms=TERMS,
-        close=sentences.CLOSE,
-        similar=sentences.SIMILAR,
-        separated=SEPARATED,
-        explains=EXPLAINS,
-        grazing_deg=GRAZING_DEG,
-        **dict.fromkeys(("distances_figure", "ablation_figure", "telling_figure"), "picture"),
-    )
-    assert ("reflects" in page) is known
-    assert ("the readings tell" in page or "tells the two models apart" in page or "cannot tell" in page) is known
-    assert ("The noise of the measurements is not known" in page) is not known
-    assert f"{match.distances.whole['ngan'].value:.3g} <span" in page
-    assert page.count("lambert+ggx by lambert+blinn-phong") == 4
+    told = plain(match_record.to_dict(one, None))
+    assert (told["causes"] is None, told["telling"] is None) == (not known, not known)
+    assert [i["metric"] for i in told["imitations"]] == [*IMITATED, *IMITATED]
+    assert told["verdict"] == one.verdict
+    if ablation is not None:
+        assert told["causes"]["grazing_named"] == list(ablation.causes(ablation.grazing))
+        assert [t["separation"] for t in told["telling"]] == match.telling.separation.T.tolist()
+
+
+def test_an_empirical_model_serves_up_to_where_it_differs_moderately(match: Match) -> None:
+    """From 0° on without a gap: what holds beyond a break does not count."""
+    curves = dict(match.distances.by_incidence)
+
+    def serving(best: list[float]) -> float | None:
+        row = np.r_[best, np.full(len(match.distances.theta_i) - len(best), 0.1)]
+        found = dataclasses.replace(
+            match.distances, by_incidence=curves | {"relative": np.stack([0 * row, row, 9 + row])}
+        )
+        return dataclasses.replace(match, distances=found).serves_up_to_deg
+
+    assert serving([0.31]) is None
+    assert serving([0.1, 0.29, 0.31]) == pytest.approx(5.0)
+    assert serving([]) == pytest.approx(85.0)
 
 
 def test_fits_stand_for_their_approximations(fits: tuple[Fit, Fit]) -> None:

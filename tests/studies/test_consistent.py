@@ -1,6 +1,7 @@
 """What a study says agrees with itself: points lie in their intervals, and no two sentences contradict."""
 
 import dataclasses
+import json
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -12,6 +13,7 @@ import fitmat as fm
 from fitmat.fitting.quantities import UNDETERMINED
 from fitmat.reports.rows import parameter_rows
 from fitmat.studies import record
+from fitmat.studies.cards import BAD, GOOD, MOST_WORDS, Card, best, cards
 from fitmat.studies.study import Study, study
 from fitmat.uncertainty.estimate import Estimate
 
@@ -38,7 +40,7 @@ def estimates(thing: Any, place: str = "") -> Iterator[tuple[str, Estimate]]:
 
 def contradictions(found: Study) -> list[str]:
     """Every point outside its interval and every pair of statements that do not go together."""
-    return [*_points(found), *_states(found), *_sentences(found)]
+    return [*_points(found), *_states(found), *_sentences(found), *_cards(found)]
 
 
 def _points(found: Study) -> Iterator[str]:
@@ -57,14 +59,18 @@ def _states(found: Study) -> Iterator[str]:
     written = {one["model"]: one for one in record.to_dict(found)["fits"]}
     for one in found.findings:
         lost = {q.name for q in one.parameters if UNDETERMINED in q.remarks}
-        rows = {row["name"] for row in parameter_rows(one) if (row["kind"], row["remark"]) == ("fitted", UNDETERMINED)}
+        rows = {
+            row["name"]
+            for row in parameter_rows(written[one.name], found.measurements.channels)
+            if (row["kind"], row["remark"]) == ("fitted", UNDETERMINED)
+        }
         if set(written[one.name]["not_determined"]) != lost:
             yield f"{one.name}: the record calls other parameters not determined than the table"
         if not set(one.fit.undetermined) <= lost:
             yield f"{one.name}: {one.fit.undetermined} not determined by the fit, {lost} in the table"
         if one.identifiability is not None and set(one.identifiability.undetermined) != rows:
             yield f"{one.name}: identifiability {one.identifiability.undetermined}, table {rows}"
-        for row in parameter_rows(one):
+        for row in parameter_rows(written[one.name], found.measurements.channels):
             if row["remark"] == UNDETERMINED and "±" in row["value"]:
                 yield f"{one.name} {row['name']}: a standard deviation of what is not determined"
         missed = one.fit.adequacy.startswith("inadequate")
@@ -92,6 +98,47 @@ def _sentences(found: Study) -> Iterator[str]:
         yield f"hardly differ, {apart.value} apart"
     if "cannot tell them apart" in words and "tells them apart at every" in words:
         yield "told apart and not"
+
+
+def _cards(found: Study) -> Iterator[str]:
+    """The three answers against what they are about."""
+    told = json.loads(json.dumps(record.to_dict(found)))
+    material, phong, trust = cards(told)
+    for card in (material, phong, trust):
+        if len(card.sentence.split()) > MOST_WORDS:
+            yield f"{card.sentence}: more than {MOST_WORDS} words"
+    stands = best(told)
+    if stands is None:
+        return
+    one = next(f for f in found.findings if f.name == stands["model"])
+    lost = {q.name for q in one.parameters if UNDETERMINED in q.remarks}
+    if trust.level == GOOD and (one.doubts.words or lost or not one.doubts.intervals_hold or found.warnings):
+        yield f"{trust.sentence} though {one.doubts.words}, {lost} and {found.warnings}"
+    if (material.level == GOOD) == one.doubts.inadequate:
+        yield f"{material.word} of a model whose doubts are {one.doubts.words}"
+    if trust.word == "in part" and not any(name in trust.sentence for name in lost):
+        yield f"{trust.sentence} but {lost} are not determined"
+    if not one.doubts.intervals_hold and trust.level != BAD:
+        yield f"{trust.sentence} though the intervals do not hold"
+    if "kd" in lost and "diffuse" in material.sentence:
+        yield f"{material.sentence} with kd not determined"
+    if found.match is not None:
+        yield from _served(found, phong)
+
+
+def _served(found: Study, phong: Card) -> Iterator[str]:
+    match = found.match
+    assert match is not None
+    preferred = match.delta_bic <= -10 or match.perceived is None
+    apart = match.distances.by_incidence["relative"][1]
+    if phong.level == GOOD and not preferred and match.measured_distance.value > 0.3 + ROUNDING:
+        yield f"{phong.sentence} though they differ strongly"
+    if phong.word == "does not serve" and apart[:5].max() < 0.3:
+        yield f"{phong.sentence} though within {apart[:5]} up to 20°"
+    if "ΔE2000" in phong.sentence and match.perceived is not None:
+        value = match.perceived.delta_e_2000.mean.value
+        if f"ΔE2000 {value:.1f} on average" not in phong.sentence:
+            yield f"{phong.sentence} with ΔE2000 {value}"
 
 
 TRUTHS = [

@@ -135,7 +135,7 @@ def test_everything_is_computed_once_and_then_read(
     assert found.match.imitations == ()  # which only a full study asks for
     record.to_dict(found)
     page.write(tmp_path, found)
-    terminal.show(found, tmp_path)
+    terminal.show(record.to_dict(found), tmp_path)
     assert calls == {**{name: 2 for _, name in watched}, "compare": 1}
 
 

@@ -44,6 +44,8 @@ OutFlag = Annotated[
     ),
 ]
 
+ReplacePageFlag = Annotated[bool, typer.Option("--force", help="Replace the page that is there.")]
+
 ForceFlag = Annotated[bool, typer.Option("--force", help="Replace the report of an earlier run in --out.")]
 
 JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]

@@ -87,7 +87,7 @@ FullFlag = Annotated[
     bool,
     typer.Option(
         "--full",
-        help="Ask and draw everything: residuals, corner plots and lit spheres as pictures, the parameters with which "
-        "one model best imitates the other, and what each predicts of single values left out.",
+        help="Ask and draw everything: up to 12 channels, lit spheres, the parameters with which one model best "
+        "imitates the other, and what each predicts of single values left out.",
     ),
 ]

@@ -1,0 +1,189 @@
+"""Rendering: a run's record and its figures as one HTML page that fetches nothing and runs no script but its own.
+
+It computes nothing: all that is said and drawn is in what it is given.
+"""
+
+import base64
+import functools
+import hashlib
+import json
+from collections.abc import Mapping
+from importlib.resources import files
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from fitmat.fitting.concluding import RESULTS
+from fitmat.judgement import budget
+from fitmat.match.ablation import EXPLAINS
+from fitmat.match.appearance.colour import WHITE_LUMINANCE
+from fitmat.match.appearance.spheres import CLEARLY_VISIBLE, JUST_NOTICEABLE
+from fitmat.match.discernibility import SEPARATED
+from fitmat.match.regions import REGIONS
+from fitmat.match.sentences import CLOSE, SIMILAR
+from fitmat.models.metrics import METRICS
+from fitmat.reports import drawings
+from fitmat.reports.rows import parameter_rows, prior_rows
+from fitmat.reports.snippets import snippets
+from fitmat.studies.cards import best, cards, title
+from fitmat.text import visible
+from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAIL_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS
+
+SCRIPTS = (
+    "uplot/uPlot.iife.min.js",
+    "core.js",
+    "charts.js",
+    "curves.js",
+    "maps.js",
+    "match.js",
+    "corner.js",
+    "page.js",
+)
+"""What a page runs, in this order: the chart library, then ours."""
+
+STYLES = ("uplot/uPlot.min.css", "page.css")
+
+LICENCE = "uplot/LICENSE"
+"""Of the chart library, which each page holds."""
+
+POLICY = (
+    "default-src 'none'; script-src {}; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
+)
+"""What a browser lets the page do: run the scripts of these hashes, and show pictures that it holds itself."""
+
+DIGITS = 7
+"""Significant digits of the record's numbers in a page: more than is shown, fewer than a file keeps."""
+
+
+def to_html(record: Mapping[str, Any], figures: Mapping[str, Any]) -> str:
+    """The page of a run.
+
+    Args:
+        record: JSON types, as `studies.record.to_dict` makes them.
+        figures: The same, of `studies.figures.to_dict`.
+    """
+    told, drawn = _shown(record), _shown(figures)
+    scripts = [_static(name) for name in SCRIPTS]
+    hashes = " ".join(f"'sha256-{_digest(script)}'" for script in scripts)
+    return (
+        _environment()
+        .get_template("report.html")
+        .render(
+            record=told,
+            figures=drawn,
+            cards=cards(told),
+            best=best(told),
+            policy=POLICY.format(hashes),
+            scripts=[Markup(script) for script in scripts],
+            styles=[Markup(_static(name)) for name in STYLES],
+            licence=Markup(_static(LICENCE)),
+            data=Markup(_embedded({"record": _rounded(told), "figures": drawn})),
+            swatch=figures["swatches"],
+            **_WORDS,
+        )
+    )
+
+
+_WORDS = {
+    "of": budget,
+    "results": RESULTS,
+    "verdicts": VERDICTS,
+    "regions": REGIONS,
+    "metrics": METRICS,
+    "close": CLOSE,
+    "similar": SIMILAR,
+    "separated": SEPARATED,
+    "explains": EXPLAINS,
+    "just_noticeable": JUST_NOTICEABLE,
+    "clearly_visible": CLEARLY_VISIBLE,
+    "white_luminance": WHITE_LUMINANCE,
+    "enough": {"tau": ENOUGH_TAU, "ess": ENOUGH_ESS, "tail_ess": ENOUGH_TAIL_ESS, "rhat": GOOD_RHAT},
+}
+# What words and thresholds of the page mean, where they are defined.
+
+
+@functools.cache
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("fitmat.reports"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters |= {
+        "subscripted": _subscripted,
+        "digits": _digits,
+        "percent": _percent,
+        "title": title,
+        "held": _held,
+    }
+    environment.globals |= {
+        "rows": parameter_rows,
+        "prior_rows": prior_rows,
+        "snippets": snippets,
+        "static_curves": drawings.curves,
+        "interval_bar": drawings.interval_bar,
+        "share_bar": drawings.share_bar,
+    }
+    return environment
+
+
+def load() -> None:
+    """Load what pages are made with."""
+    for name in _environment().list_templates():
+        _environment().get_template(name)
+    for name in (*SCRIPTS, *STYLES, LICENCE):
+        _static(name)
+
+
+@functools.cache
+def _static(name: str) -> str:
+    return files("fitmat.reports").joinpath("static", name).read_text(encoding="utf-8")
+
+
+def _digest(script: str) -> str:
+    return base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
+
+
+def _shown(thing: Any) -> Any:
+    """JSON types with every text as a page shows it, without marks that would turn or hide what follows."""
+    if isinstance(thing, str):
+        return visible(thing, keep="\n")
+    if isinstance(thing, Mapping):
+        return {visible(str(key)): _shown(value) for key, value in thing.items()}
+    return [_shown(part) for part in thing] if isinstance(thing, list | tuple) else thing
+
+
+def _embedded(thing: Any) -> str:
+    """JSON that ends no script and begins no tag."""
+    text = json.dumps(thing, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+
+
+def _rounded(thing: Any) -> Any:
+    if isinstance(thing, float):
+        return float(f"{thing:.{DIGITS}g}")
+    if isinstance(thing, dict):
+        return {key: _rounded(value) for key, value in thing.items()}
+    return [_rounded(part) for part in thing] if isinstance(thing, list) else thing
+
+
+def _subscripted(symbol: str) -> Markup:
+    """`k_d` as people write it, k with a small d below."""
+    letter, _, below = symbol.partition("_")
+    return Markup("{}<sub>{}</sub>").format(letter, below) if below else Markup("{}").format(symbol)
+
+
+def _held(text: str) -> Markup:
+    """A sentence whose numbers keep to their units where a line ends."""
+    return Markup("{}").format(text.replace(" %", "\u00a0%").replace(" ± ", "\u00a0±\u00a0").replace(" × ", "\u00a0× "))
+
+
+def _digits(value: float | None, form: str = ".3g") -> str:
+    return "–" if value is None else format(value, form)
+
+
+def _percent(value: float | None, form: str = ".0f") -> str:
+    return "–" if value is None else f"{100 * value:{form}} %"
