@@ -52,6 +52,9 @@ from .studies.study import study as study
 from .studies.study import Study as Study
 from .studies.result import load as load
 
+# Batch
+from .batches.batch import batch as batch
+
 # Export
 from .exports.export import export as export
 

@@ -86,6 +86,22 @@ def new(target: Path, *, own: Callable[[Path], Sequence[str]], force: bool = Fal
             raise OutputError(f"cannot write {target}: {_reason(error)}; the report is not there.") from error
 
 
+@contextlib.contextmanager
+def alone(target: Path) -> Iterator[None]:
+    """A folder that stays as it grows, for one run at a time; made where it does not exist.
+
+    Raises:
+        OutputError: another run writes into it, or it cannot be made.
+    """
+    with contextlib.ExitStack() as held:
+        try:
+            target.mkdir(parents=True, exist_ok=True)
+            held.enter_context(_locked(target / f"{WORK}run", target))
+        except OSError as error:
+            raise OutputError(f"cannot write {target}: {_reason(error)}; choose another place with --out.") from error
+        yield
+
+
 def _work(target: Path) -> Path:
     """The folder in which `target` is made: beside it, or in it where it cannot be replaced as a whole."""
     place = Path(os.path.realpath(target))

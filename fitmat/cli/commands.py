@@ -6,6 +6,7 @@ from typing import Any
 import typer
 
 from fitmat.cli import examples, process
+from fitmat.cli.flags.batch import BatchOutFlag, JobsFlag, McmcFlag, ProcessesFlag, SourcesFlag
 from fitmat.cli.flags.cache import ClearFlag
 from fitmat.cli.flags.design import CountFlag, ForFlag, KindFlag
 from fitmat.cli.flags.export import (
@@ -365,6 +366,40 @@ def labs(
         process.say(labs.as_json(found))
     else:
         labs.show(found)
+
+
+@app.command(
+    cls=Command,
+    epilog=examples.BATCH,
+)
+@takes(reading, instrument)
+def batch(
+    reading: dict[str, Any],
+    instrument: Any,
+    files: SourcesFlag = None,
+    out: BatchOutFlag = Path("fitmat-batch"),
+    jobs: JobsFlag = None,
+    models: ModelsFlag = DEFAULT_MODELS,
+    processes: ProcessesFlag = None,
+    mcmc: McmcFlag = False,
+    seed: SeedFlag = 0,
+    fix: FixFlag = None,
+    masking: MaskingFlag = None,
+    loss: LossFlag = "default",
+    prior: PriorFlag = None,
+    ior: IorFlag = None,
+    tilt: TiltFlag = False,
+) -> None:
+    """Fit every file of a folder or a list, and write one table of all."""
+    process.set_up()
+    from fitmat.cli import batch, fit
+
+    told = {"models": models, "loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
+    told |= {"sampling": mcmc} | fit.known(fix or [], prior or [])
+    found = batch.run(files or [], out, jobs, reading | {"instrument": instrument}, told, processes)
+    batch.show(found)
+    if found.counts["refused"]:
+        raise typer.Exit(NOT_CONVERGED)
 
 
 @app.command(cls=Command)

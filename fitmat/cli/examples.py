@@ -39,6 +39,15 @@ DESIGN = (
     "  fitmat design measurements.csv --for match --kind curve --plot next.png"
 )
 
+BATCH = (
+    "Written to --out: results.parquet, one row for each file and model with every parameter, its interval, the "
+    "doubts and the match; a file that cannot be used is a row with its sentence. Interrupted or killed, the same "
+    "command goes on; a file that changed is done again.\n\n"
+    "Examples:\n\n  fitmat batch scans --out results\n\n"
+    "  fitmat batch 'scans/*.csv' --models lambert+ggx --fix ks=1\n\n"
+    "  fitmat batch --jobs jobs.csv"
+)
+
 LABS = (
     "What the flags state of the instrument holds for each laboratory by itself: with --calibration 0.03 the scale of "
     "each may be off by 3 % of its own.\n\n"

@@ -42,8 +42,23 @@ def model_names(asked: str | Sequence[str], measurements: Measurements) -> list[
     Raises:
         ModelError: no name is given, or one is unknown.
     """
-    if isinstance(asked, str) and asked.strip() == EVERY:
-        return list(every_model(measurements))
+    return list(every_model(measurements)) if wants_all(asked) else named(asked)
+
+
+def wants_all(asked: str | Sequence[str]) -> bool:
+    """Whether all models are asked for, instead of some by name."""
+    return isinstance(asked, str) and asked.strip() == EVERY
+
+
+def named(asked: str | Sequence[str]) -> list[str]:
+    """Model names, checked, without repeats.
+
+    Args:
+        asked: Names, or a text with commas between them.
+
+    Raises:
+        ModelError: no name is given, or one is unknown.
+    """
     parts = asked.split(",") if isinstance(asked, str) else asked
     for part in parts:
         arguments.kind("one of models", part, str)

@@ -33,7 +33,7 @@ IDLE: dict[str, tuple[tuple[str, ...], str]] = {
     "files that nobody joins": (
         ("fit", "a.csv", "b.csv"),
         "2 files are given (a.csv, b.csv), expected one. If they are one measurement of one sample, as one for each "
-        "incidence, add --join; else give them one by one.",
+        "incidence, add --join; to fit each by itself: fitmat batch.",
     ),
     "many files": (("check", *(f"{k}.csv" for k in range(9))), "9 files are given (0.csv, 1.csv, 2.csv, 3.csv, …)"),
     "a file too many": (("convert", "a.csv", "b.csv", "c.csv"), "2 files are given (a.csv, b.csv), expected one"),

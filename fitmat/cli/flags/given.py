@@ -47,7 +47,7 @@ def _refuse_unjoined(ctx: Any) -> None:
         named = ", ".join(path.name for path in files[:MOST]) + (", …" if len(files) > MOST else "")
         ctx.fail(
             f"{len(files)} files are given ({named}), expected one. If they are one measurement of one sample, as one "
-            "for each incidence, add --join; else give them one by one."
+            "for each incidence, add --join; to fit each by itself: fitmat batch."
         )
     if len(files) == 1 and join:
         ctx.fail("--join would change nothing for one file. Give the others too, or leave it out.")

@@ -1,0 +1,168 @@
+"""Batch: many files studied side by side, each kept when it is done, and the table of them all.
+
+What was done before is not done again; what cannot be done is a row that says why.
+"""
+
+import dataclasses
+import io
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from fitmat import arguments, files
+from fitmat._types import Progress
+from fitmat.batches import rows, workers
+from fitmat.batches.jobs import Job, digest, every_file, from_table
+from fitmat.errors import FitmatError, OutputError
+from fitmat.studies.plan import DEFAULT_MODELS, named, wants_all
+
+TABLE, PARTS = "results.parquet", "parts"
+"""What a batch leaves in its folder: the table, and the rows of each file by key."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Batch:
+    """What a batch found.
+
+    Attributes:
+        file: The table on disk.
+        table: One row for each file and model.
+        counts: Files that were fitted, refused, and that were done by an earlier run.
+    """
+
+    file: Path
+    table: pl.DataFrame
+    counts: Mapping[str, int]
+
+    def __str__(self) -> str:
+        """How many files were fitted, how many were not and why."""
+        told = f"{self.counts['fitted']} of {self.counts['fitted'] + self.counts['refused']} files fitted"
+        again = f" ({self.counts['earlier']} known from an earlier run)" if self.counts["earlier"] else ""
+        lost = self.table.filter(pl.col("outcome").is_in([rows.REFUSED, rows.FAILED]))
+        return "\n".join([f"{told}{again}.", *lost["message"].to_list()])
+
+
+def batch(
+    sources: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
+    folder: str | os.PathLike[str],
+    models: str | Sequence[str] = DEFAULT_MODELS,
+    *,
+    jobs: str | os.PathLike[str] | None = None,
+    reading: Mapping[str, Any] | None = None,
+    studying: Mapping[str, Any] | None = None,
+    processes: int | None = None,
+    progress: Progress | None = None,
+) -> Batch:
+    """Study every file, and write one table of all.
+
+    Args:
+        sources: Files, folders, patterns such as "scans/*.csv"; may be empty where `jobs` is given.
+        folder: For `results.parquet`, and what is kept to go on after an interruption.
+        models: As in `fitmat.study`.
+        jobs: A table with a column `file`, and others for what differs from file to file: `columns`, `ior`, `fix`, ….
+        reading: Arguments of `fitmat.read` for every file.
+        studying: Arguments of `fitmat.study` for every file; without "sampling" the posteriors are Laplace's.
+        processes: How many work side by side; None for one for each core.
+        progress: Called with what is done next.
+
+    Returns:
+        A `Batch`; a file that cannot be used is a row with its sentence.
+
+    Raises:
+        FitmatError: no file is found, a table of jobs cannot be read, another batch writes there, or the disk refuses.
+
+    Example:
+        >>> batch("scans/*.csv", "results").table  # doctest: +SKIP
+    """
+    arguments.kind("folder", folder, str, os.PathLike)
+    arguments.whole("processes", processes, 1, optional=True)
+    arguments.function("progress", progress)
+    arguments.named(reading=reading, studying=studying)
+    if not wants_all(models):
+        named(models)
+    told = {"sampling": False} | dict(studying or {}) | {"models": models}
+    listed = _jobs(sources, jobs, dict(reading or {}), told)
+    target = Path(folder)
+    with files.alone(target):
+        return _studied(listed, target, processes or os.cpu_count() or 1, progress or (lambda *_: None))
+
+
+def _jobs(sources: Any, table: Any, reading: dict[str, Any], told: dict[str, Any]) -> list[Job]:
+    arguments.kind("jobs", table, str, os.PathLike, optional=True)
+    given = [sources] if isinstance(sources, str | os.PathLike) else sources
+    arguments.kind("sources", given, Sequence)
+    for path in given:
+        arguments.kind("one of sources", path, str, os.PathLike)
+    listed = [Job(path, reading, told) for path in every_file([Path(path) for path in given])]
+    every = [*listed, *(from_table(Path(table), reading, told) if table is not None else [])]
+    if not every:
+        raise FitmatError("no file is given, expected files, a folder, a pattern or a table of jobs.")
+    return every
+
+
+def _studied(every: Sequence[Job], target: Path, processes: int, say: Progress) -> Batch:
+    """The table of all jobs; rows are kept as they come."""
+    done: dict[int, list[dict[str, Any]]] = {}
+    keys: dict[str, list[int]] = {}
+    waiting: dict[str, tuple[Job, str]] = {}
+    for k, job in enumerate(every):
+        try:
+            content = digest(job.path)
+        except FitmatError as error:
+            done[k] = rows.refused(error)
+            continue
+        key = job.key(content)
+        keys.setdefault(key, []).append(k)
+        waiting[key] = (job, content)
+    earlier = dict(_kept(target, waiting))
+    for key, found in earlier.items():
+        del waiting[key]
+        done |= dict.fromkeys(keys[key], found)
+    _tell(say, done, len(every))
+    for key, found in workers.each(waiting, processes):
+        if not any(row["outcome"] == rows.FAILED for row in found):
+            files.write_text(target / PARTS / f"{key}.json", json.dumps(found, ensure_ascii=False))
+        done |= dict.fromkeys(keys[key], found)
+        _tell(say, done, len(every))
+    table = _table(every, done)
+    memory = io.BytesIO()
+    table.write_parquet(memory)
+    file = files.write_bytes(target / TABLE, memory.getvalue())
+    lost = sum(_lost(found) for found in done.values())
+    before = sum(len(keys[key]) for key in earlier)
+    return Batch(file, table, {"fitted": len(every) - lost, "refused": lost, "earlier": before})
+
+
+def _lost(found: Sequence[Mapping[str, Any]]) -> bool:
+    return found[0]["outcome"] in (rows.REFUSED, rows.FAILED)
+
+
+def _tell(say: Progress, done: Mapping[int, Any], total: int) -> None:
+    lost = sum(_lost(found) for found in done.values())
+    say(f"fitting {total} files{f', {lost} refused' if lost else ''}", len(done), total)
+
+
+def _kept(target: Path, waiting: Mapping[str, Any]) -> Iterator[tuple[str, list[dict[str, Any]]]]:
+    """Rows that an earlier run left, by key; one that cannot be read is done again."""
+    for key in waiting:
+        try:
+            found = json.loads((target / PARTS / f"{key}.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            continue
+        if isinstance(found, list) and found and all(isinstance(row, dict) and "outcome" in row for row in found):
+            yield key, found
+
+
+def _table(every: Sequence[Job], done: Mapping[int, list[dict[str, Any]]]) -> pl.DataFrame:
+    """One row for each file and model, the columns in the order in which they first appear."""
+    flat = [{"file": os.fspath(job.path)} | row for k, job in enumerate(every) for row in done[k]]
+    names = list(dict.fromkeys(name for row in flat for name in row))
+    columns = {name: [row.get(name) for row in flat] for name in names}
+    try:
+        return pl.DataFrame({name: pl.Series(name, column, strict=False) for name, column in columns.items()})
+    except pl.exceptions.PolarsError as error:
+        raise OutputError(f"the rows make no table ({error}); their parts are kept.") from error

@@ -1,0 +1,83 @@
+"""Batches: many files side by side, and at the end what became of them.
+
+It fits nothing itself.
+"""
+
+import signal
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from fitmat.batches.batch import Batch, batch
+from fitmat.cli import interrupts, process, session
+from fitmat.text import visible
+
+MOST = 20
+"""Rows that are shown; the table has all."""
+
+
+def run(
+    sources: Sequence[Path],
+    folder: Path,
+    jobs: Path | None,
+    reading: Mapping[str, Any],
+    studying: Mapping[str, Any],
+    processes: int | None,
+) -> Batch:
+    """The batch; Ctrl-C ends it, and what was done is kept.
+
+    Args:
+        sources: Files, folders and patterns.
+        folder: Where to.
+        jobs: Table of what differs from file to file.
+        reading: Arguments of `fitmat.read`.
+        studying: Arguments of `fitmat.study`, models included.
+        processes: How many work side by side.
+
+    Raises:
+        FitmatError: as `batch`.
+        SystemExit: it was interrupted.
+    """
+    told = dict(studying)
+    models = told.pop("models")
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with session.watch() as watch:
+            known = {"jobs": jobs, "reading": reading, "studying": told, "processes": processes}
+            return batch(sources, folder, models, progress=watch, **known)
+    except KeyboardInterrupt:
+        process.say(f"fitmat: interrupted; what was done is kept in {folder}: the same command goes on.", err=True)
+        raise SystemExit(interrupts.INTERRUPTED) from None
+
+
+def show(found: Batch, screen: Console | None = None) -> None:
+    """Print what became of the files: the preferred model of each, and why some have none.
+
+    Args:
+        found: What to show.
+        screen: Where to; stdout if None.
+    """
+    out = screen or Console()
+    plain = not out.is_terminal or out.is_dumb_terminal
+    count, *lost = str(found).split("\n")
+    if "best" in found.table.columns:
+        best = found.table.filter(pl.col("best"))
+        table = Table("file", "model", "outcome", "misfit / noise", box=None, pad_edge=False, header_style="dim")
+        for file, model, outcome, ratio in best["file", "model", "outcome", "misfit_over_noise"].head(MOST).iter_rows():
+            cells = (Path(file).name, model, outcome, "–" if ratio is None else f"{ratio:.2g}")
+            table.add_row(*(Text(visible(cell)) for cell in cells))
+        out.print(table, soft_wrap=plain)
+        if len(best) > MOST:
+            out.print(Text(f"and {len(best) - MOST} more", "dim"))
+        out.print()
+    out.print(Text(count, "bold"), soft_wrap=plain)
+    for words in lost[:MOST]:
+        out.print(Text(visible(words)), soft_wrap=plain)
+    if len(lost) > MOST:
+        out.print(Text(f"and {len(lost) - MOST} more: outcome and message in the table.", "dim"), soft_wrap=plain)
+    process.say(f"\nTable: {found.file}")

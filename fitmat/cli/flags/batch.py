@@ -1,0 +1,41 @@
+"""Flags of a batch: its files, where the table goes, and how many work on it.
+
+They set no default and check nothing but their type.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+SourcesFlag = Annotated[
+    list[Path] | None,
+    typer.Argument(
+        help="Files of measurements, folders of them, or patterns in quotes ('scans/*.csv'), in any format that fit "
+        "reads.",
+        show_default=False,
+    ),
+]
+
+BatchOutFlag = Annotated[
+    Path, typer.Option(help="Folder for results.parquet; the same one goes on where it stopped.", metavar="DIR")
+]
+
+JobsFlag = Annotated[
+    Path | None,
+    typer.Option(
+        help="CSV with a column file, and any of columns, quantity, theta_i, panel, ior, fix, prior, models, … for "
+        "what differs from file to file; blank cells are as the flags say.",
+        metavar="FILE",
+        show_default=False,
+    ),
+]
+
+ProcessesFlag = Annotated[
+    int | None,
+    typer.Option(min=1, help="How many files at once; default one for each core.", metavar="N", show_default=False),
+]
+
+McmcFlag = Annotated[
+    bool, typer.Option("--mcmc", help="Sample every posterior; slower, else intervals from Laplace's approximation.")
+]

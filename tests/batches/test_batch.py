@@ -1,0 +1,214 @@
+"""Batches: rows are those of single studies, nothing is done twice or lost, and one bad file is one row."""
+
+import json
+import os
+import shutil
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+import pytest
+
+import fitmat as fm
+from fitmat import files
+from fitmat.batches import workers
+from fitmat.batches.jobs import Job, digest, every_file, from_table
+from fitmat.batches.workers import studied
+from fitmat.errors import FitmatError
+
+DATA = Path(__file__).parents[2] / "data" / "synthetic"
+
+TOLD: dict[str, Any] = {"models": "lambert", "sampling": False}
+
+SAME = 1e-9
+"""Relative; the same program on the same numbers in another process."""
+
+
+def one_by_one(jobs: Any, count: int, work: Callable[..., Any] = studied) -> Any:
+    """As `workers.each`, in this process."""
+    for key, told in list(jobs.items()):
+        yield key, work(*told)
+
+
+@pytest.fixture
+def scans(tmp_path: Path) -> Path:
+    """Two good files, one of them twice, one broken, one hidden, and a folder."""
+    folder = tmp_path / "scans"
+    (folder / "older").mkdir(parents=True)
+    for name in ("sparse", "wax"):
+        shutil.copy(DATA / f"{name}.csv", folder)
+    shutil.copy(DATA / "wax.csv", folder / "wax again.csv")
+    (folder / "bad.csv").write_text("theta_i,theta_o,brdf\n10,20,much\n", encoding="utf-8")
+    (folder / ".hidden").write_text("x", encoding="utf-8")
+    return folder
+
+
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "each", one_by_one)
+
+
+@pytest.mark.study
+@pytest.mark.usefixtures("here")
+def test_rows_are_those_of_single_studies(scans: Path, tmp_path: Path) -> None:
+    told: list[tuple[str, int, int]] = []
+    found = fm.batch(scans, tmp_path / "out", progress=lambda *said: told.append(said))
+    table = pl.read_parquet(tmp_path / "out" / "results.parquet")
+    assert table.equals(found.table)
+    names = [Path(file).name for file in table["file"]]
+    assert names == ["bad.csv", *(name for name in ("sparse.csv", "wax again.csv", "wax.csv") for _ in range(2))]
+    for name in ("sparse.csv", "wax.csv"):
+        alone = fm.study(DATA / name, sampling=False)
+        assert alone.match is not None
+        for one in alone.findings:
+            row = table.filter(pl.col("file").str.ends_with(f"/{name}"), pl.col("model") == one.name).row(0, named=True)
+            assert row["outcome"] == one.fit.result
+            assert row["best"] == (alone.choice is not None and alone.choice.candidates[0].name == one.name)
+            assert row["match_distance"] == pytest.approx(alone.match.hemisphere_distance.value, rel=SAME)
+            for q in one.parameters:
+                assert row[q.name] == pytest.approx(q.value[0], rel=SAME)
+                assert [row[f"{q.name}_low"], row[f"{q.name}_high"]] == pytest.approx(list(q.ci95[0]), rel=SAME)
+    bad = table.row(0, named=True)
+    assert (bad["outcome"], bad["model"], bad["exponent"]) == ("refused", None, None)
+    assert bad["message"].startswith("bad.csv")
+    assert str(found) == f"3 of 4 files fitted.\n{bad['message']}"
+    assert told[-1] == ("fitting 4 files, 1 refused", 4, 4)
+
+
+@pytest.mark.usefixtures("here")
+def test_what_is_done_is_not_done_again(scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """But for a file that changed, another question, and a part that is damaged."""
+    asked: list[str] = []
+
+    def counted(job: Job, content: str) -> Any:
+        asked.append(job.path.name)
+        return studied(job, content)
+
+    monkeypatch.setattr(workers, "each", lambda jobs, count: one_by_one(jobs, count, counted))
+    out = tmp_path / "out"
+    first = fm.batch(scans, out, "lambert")
+    assert sorted(asked) == ["bad.csv", "sparse.csv", "wax again.csv", "wax.csv"]
+    asked.clear()
+    again = fm.batch(scans, out, "lambert")
+    assert asked == []
+    assert again.table.equals(first.table)
+    assert str(again).startswith("3 of 4 files fitted (4 known from an earlier run).")
+    with (scans / "sparse.csv").open("a", encoding="utf-8") as file:
+        file.write("20,5,0.1,0.003\n")
+    fm.batch(scans, out, "lambert")
+    assert asked == ["sparse.csv"]
+    asked.clear()
+    fm.batch(scans / "wax.csv", out, "lambert", studying={"fixed": {"kd": 0.5}})
+    assert asked == ["wax.csv"]
+    for part in (out / "parts").iterdir():
+        part.write_text("[", encoding="utf-8")
+    asked.clear()
+    assert len(fm.batch(scans, out, "lambert").table) == len(first.table)
+    assert len(asked) == 4
+
+
+def test_a_file_that_changes_while_it_waits_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "wax.csv"
+    shutil.copy(DATA / "wax.csv", path)
+    (row,) = studied(Job(path, {}, TOLD), "another")
+    assert (row["outcome"], row["message"]) == (
+        "refused",
+        f"{path} changed while it waited. Give the same command again.",
+    )
+
+
+def test_a_fault_of_ours_is_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "study", lambda *_, **__: 1 / 0)
+    (row,) = studied(Job(DATA / "wax.csv", {}, TOLD), digest(DATA / "wax.csv"))
+    assert row["outcome"] == "failed"
+    assert row["message"].startswith("ZeroDivisionError: division by zero. Please report it")
+
+
+def test_a_table_of_jobs_says_what_differs(tmp_path: Path) -> None:
+    table = tmp_path / "jobs.csv"
+    table.write_text("file,theta_i,fix,models\na.csv,30,ks=1;kd=0.2,ggx\nb.csv,,,\n", encoding="utf-8")
+    first, second = from_table(table, {"quantity": "brdf", "constants": {"phi": 0.0}}, TOLD)
+    assert first.path == tmp_path / "a.csv"
+    assert first.reading == {"quantity": "brdf", "constants": {"phi": 0.0, "theta_i": 30}}
+    assert first.studying == TOLD | {"models": "ggx", "fixed": {"ks": 1.0, "kd": 0.2}}
+    assert second.reading == {"quantity": "brdf", "constants": {"phi": 0.0}}
+    assert second.studying == TOLD
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("name,ior\na.csv,Au\n", r"jobs\.csv: columns name, ior, expected file and any of angle_unit, columns, "),
+        ("file,iors\na.csv,Au\n", r"jobs\.csv: a column 'iors', expected file and any of"),
+        ("file,ior\n,Au\n", r"jobs\.csv: a row without a file, expected a path in each"),
+        ("", r"jobs\.csv: no table of jobs can be read .*Write CSV with a column file"),
+    ],
+)
+def test_a_table_of_jobs_that_says_nothing_is_refused(text: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "jobs.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(FitmatError, match=message):
+        fm.batch([], tmp_path / "out", jobs=tmp_path / "jobs.csv")
+
+
+def test_what_is_not_there_is_refused_before_anything(tmp_path: Path) -> None:
+    with pytest.raises(FitmatError, match=r"nowhere: no such file or folder, and no file of that pattern"):
+        fm.batch(tmp_path / "nowhere", tmp_path / "out")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(FitmatError, match=r"empty holds no file, expected measurements"):
+        fm.batch(tmp_path / "empty", tmp_path / "out")
+    with pytest.raises(FitmatError, match=r"no lobe 'lambort'"):
+        fm.batch(DATA / "wax.csv", tmp_path / "out", "lambort")
+    with pytest.raises(FitmatError, match=r"no file is given, expected files, a folder, a pattern or a table"):
+        fm.batch([], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_patterns_and_folders_give_each_file_once(scans: Path) -> None:
+    found = every_file([scans, scans / "wax*.csv"])
+    assert [path.name for path in found] == ["bad.csv", "sparse.csv", "wax again.csv", "wax.csv"]
+
+
+@pytest.mark.usefixtures("here")
+def test_two_batches_do_not_write_to_one_folder(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with files.alone(out), pytest.raises(FitmatError, match=r"out is being written by another run; wait for it"):
+        fm.batch(DATA / "wax.csv", out, "lambert")
+    assert len(fm.batch(DATA / "wax.csv", out, "lambert").table) == 1
+    assert sorted(os.listdir(out)) == ["parts", "results.parquet"]
+
+
+def deadly(job: Job, content: str) -> Any:
+    """Dies of the file "kills.csv" always, of "once.csv" the first time."""
+    mark = job.path.with_suffix(".seen")
+    if job.path.name == "kills.csv" or (job.path.name == "once.csv" and not mark.exists()):
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return [{"outcome": "converged", "message": "", "content": content}]
+
+
+@pytest.mark.study
+def test_a_worker_that_dies_loses_nothing_but_its_file(tmp_path: Path) -> None:
+    """One that dies once is tried again; the others are not asked for what they did."""
+    for name in ("a", "once", "kills", "b", "c"):
+        (tmp_path / f"{name}.csv").write_text(name, encoding="utf-8")
+    jobs = {path.stem: (Job(path, {}, {}), path.stem) for path in sorted(tmp_path.glob("*.csv"))}
+    found = dict(workers.each(jobs, 2, deadly))
+    assert {key: row["outcome"] for key, (row,) in found.items()} == {
+        "a": "converged", "b": "converged", "c": "converged", "kills": "failed", "once": "converged",
+    }  # fmt: skip
+    assert found["kills"][0]["message"].endswith("it was killed, or there was not enough memory.")
+
+
+@pytest.mark.study
+def test_processes_side_by_side_find_what_one_finds(scans: Path, tmp_path: Path) -> None:
+    both = fm.batch(scans, tmp_path / "both", "lambert,ggx", processes=2)
+    (tmp_path / "both" / "results.parquet").unlink()
+    parts = {path.name: json.loads(path.read_text()) for path in (tmp_path / "both" / "parts").iterdir()}
+    assert len(parts) == 4
+    alone = {path.name: studied(Job(path, {}, TOLD | {"models": "lambert,ggx"}), digest(path))
+             for path in every_file([scans])}  # fmt: skip
+    for row in both.table.iter_rows(named=True):
+        meant = next(one for one in alone[Path(row["file"]).name] if one.get("model") == row["model"])
+        assert {name: row[name] for name in meant} == meant
