@@ -328,6 +328,18 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             **dict.fromkeys(("strict", "verify", "force"), FLAG),
         },
     ),
+    "batch": (
+        {"sources": ["/dev/null"], "folder": "/proc/x"},
+        {
+            "sources": (None, 5, 1j, [], [5], [FIT], FIT),
+            "folder": PATH,
+            "models": ([], [5], "lambort"),
+            "jobs": FOLDER[:1],
+            **dict.fromkeys(("reading", "studying"), NAMED),
+            "processes": without((0, *WHOLE), NOTHING),
+            "progress": CALLED,
+        },
+    ),
     "report": ({"study": STUDY, "folder": "/proc/x"}, {"study": NOUN, "folder": PATH, "force": FLAG}),
 }
 """Public name → arguments that are right, and for each argument what is not."""
