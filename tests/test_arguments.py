@@ -328,6 +328,16 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             **dict.fromkeys(("strict", "verify", "force"), FLAG),
         },
     ),
+    "render": (
+        {"material": LAMBERT, "size": 16},
+        {
+            "material": without(NOUN, AbstractBRDF, fm.Fit),
+            "light": (None, 5, "behind", [], ["behind"], (1j, 0.0), FIT),
+            "model": TEXT,
+            "size": (15, 513, *WHOLE),
+            "exposure": ("much", 1j, [], -1.0, 0.0, FIT),
+        },
+    ),
     "batch": (
         {"sources": ["/dev/null"], "folder": "/proc/x"},
         {

@@ -115,8 +115,7 @@ def export(
     """
     arguments.choice("target", target, TARGETS)
     arguments.kind("folder", folder, str, os.PathLike, optional=True)
-    for key, text in (("model", model), ("name", name)):
-        arguments.kind(key, text, str, optional=True)
+    arguments.kind("name", name, str, optional=True)
     arguments.flags(strict=strict, verify=verify, force=force)
     grid = {key: value for key, value in {"theta_i": theta_i, "step": step}.items() if value is not None}
     if grid and not TARGETS[target].gridded:

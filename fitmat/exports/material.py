@@ -57,6 +57,7 @@ def chosen(material: Material, name: str | None = None) -> Chosen:
     Raises:
         FitmatError: it is none of these, or has no such model.
     """
+    arguments.kind("model", name, str, optional=True)
     if isinstance(material, Result):
         one = material.fitted(name)
 
