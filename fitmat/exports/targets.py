@@ -6,7 +6,7 @@ It writes nothing itself.
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from fitmat.exports import gltf, mitsuba, shaders, table, translation, verification
+from fitmat.exports import gltf, materialx, materialx_shader, mitsuba, shaders, table, translation, verification
 from fitmat.exports.material import Chosen
 from fitmat.exports.verification import Difference
 
@@ -58,6 +58,22 @@ TARGETS = {
         lambda chosen, plugin: mitsuba.notes(chosen.model),
     ),
     "gltf": Target("glTF 2.0", gltf.translated, gltf.texts, gltf.difference, gltf.notes, lambda found: found.facts),
+    "materialx": Target(
+        "MaterialX 1.39",
+        materialx.translated,
+        materialx.texts,
+        materialx_shader.difference,
+        materialx.notes,
+        materialx.facts,
+    ),
+    "openpbr": Target(
+        "OpenPBR 1.1 in MaterialX 1.39",
+        materialx.open_surface,
+        materialx.texts,
+        materialx_shader.difference,
+        materialx.notes,
+        materialx.facts,
+    ),
     "table": Target("a table of angles", table.measured, table.texts, table.difference, gridded=True),
     "merl": Target("a MERL file", table.in_cells, table.file, table.looked_up, table.notes),
 }

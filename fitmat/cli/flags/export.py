@@ -11,7 +11,10 @@ import typer
 ResultFlag = Annotated[Path, typer.Argument(help="Folder of a run of fitmat fit, or the fit.json in it.")]
 
 TargetFlag = Annotated[
-    str, typer.Option("--to", help="What it is written for: glsl, mitsuba, gltf, table or merl.", metavar="TARGET")
+    str,
+    typer.Option(
+        "--to", help="What it is written for: glsl, mitsuba, materialx, openpbr, gltf, table, merl.", metavar="TARGET"
+    ),
 ]
 
 TableThetaIFlag = Annotated[
