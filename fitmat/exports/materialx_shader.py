@@ -3,6 +3,7 @@
 It writes no document; the shader is the one that MaterialX's generator makes, under one light and no environment.
 """
 
+import importlib
 import importlib.util
 import re
 from typing import Any
@@ -61,31 +62,31 @@ def shader(document: Document) -> tuple[str, str]:
     Raises:
         OutputError: the document is not valid.
     """
-    import MaterialX
-    from MaterialX import PyMaterialXGenGlsl, PyMaterialXGenShader
-
-    path, library = MaterialX.getDefaultDataSearchPath(), MaterialX.createDocument()
-    MaterialX.loadLibraries(MaterialX.getDefaultDataLibraryFolders(), path, library)
-    read = MaterialX.createDocument()
-    MaterialX.readFromXmlString(read, xml(document))
+    names = ("MaterialX", "MaterialX.PyMaterialXGenGlsl", "MaterialX.PyMaterialXGenShader")
+    modules: list[Any] = [importlib.import_module(name) for name in names]
+    mx, glsl, generation = modules
+    path, library = mx.getDefaultDataSearchPath(), mx.createDocument()
+    mx.loadLibraries(mx.getDefaultDataLibraryFolders(), path, library)
+    read = mx.createDocument()
+    mx.readFromXmlString(read, xml(document))
     read.setDataLibrary(library)
     valid, why = read.validate()
     if not valid:
-        raise OutputError(f"MaterialX {MaterialX.getVersionString()} refuses the document ({why.strip()}).")
-    generator = PyMaterialXGenGlsl.EsslShaderGenerator.create()
-    context: Any = PyMaterialXGenShader.GenContext(generator)
+        raise OutputError(f"MaterialX {mx.getVersionString()} refuses the document ({why.strip()}).")
+    generator = glsl.EsslShaderGenerator.create()
+    context: Any = generation.GenContext(generator)
     context.registerSourceCodeSearchPath(path)
     options = context.getOptions()
-    environments = PyMaterialXGenShader.HwSpecularEnvironmentMethod
+    environments = generation.HwSpecularEnvironmentMethod
     options.hwSpecularEnvironmentMethod = environments.SPECULAR_ENVIRONMENT_FIS  # without one it does not compile
     options.hwMaxActiveLightSources = 1
-    options.shaderInterfaceType = PyMaterialXGenShader.ShaderInterfaceType.SHADER_INTERFACE_REDUCED
+    options.shaderInterfaceType = generation.ShaderInterfaceType.SHADER_INTERFACE_REDUCED
     light = library.getNodeDef("ND_directional_light")
-    PyMaterialXGenShader.HwShaderGenerator.bindLightShader(light, 1, context)
-    element = PyMaterialXGenShader.findRenderableElements(read)[0]
-    made = generator.generate("material", element, context).getSourceCode(PyMaterialXGenShader.PIXEL_STAGE)
-    PyMaterialXGenShader.HwShaderGenerator.unbindLightShaders(context)
-    return _evaluating(made), MaterialX.getVersionString()
+    generation.HwShaderGenerator.bindLightShader(light, 1, context)
+    element = generation.findRenderableElements(read)[0]
+    made = generator.generate("material", element, context).getSourceCode(generation.PIXEL_STAGE)
+    generation.HwShaderGenerator.unbindLightShaders(context)
+    return _evaluating(made), mx.getVersionString()
 
 
 def _evaluating(made: str) -> str:

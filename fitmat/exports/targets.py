@@ -59,7 +59,7 @@ TARGETS = {
     ),
     "gltf": Target("glTF 2.0", gltf.translated, gltf.texts, gltf.difference, gltf.notes, lambda found: found.facts),
     "materialx": Target(
-        "MaterialX 1.39",
+        "MaterialX 1.39.5",
         materialx.translated,
         materialx.texts,
         materialx_shader.difference,
@@ -67,7 +67,7 @@ TARGETS = {
         materialx.facts,
     ),
     "openpbr": Target(
-        "OpenPBR 1.1 in MaterialX 1.39",
+        "OpenPBR 1.1.1 in MaterialX 1.39.5",
         materialx.open_surface,
         materialx.texts,
         materialx_shader.difference,
