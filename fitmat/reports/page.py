@@ -17,7 +17,7 @@ from jinja2 import UndefinedError
 from fitmat import arguments, files
 from fitmat.errors import OutputError, ReadError
 from fitmat.measurements.parsing.contents import shown
-from fitmat.reports import rendering
+from fitmat.reports import ball, rendering
 from fitmat.studies import figures, record
 from fitmat.studies.result import FIGURES, POSTERIOR, RECORD, Result, drawn
 from fitmat.studies.study import Study
@@ -43,7 +43,7 @@ def write(folder: Path, study: Study, command: str | None = None) -> str:
     for posterior in study.posteriors:
         posterior.save(folder / POSTERIOR.format(posterior.fit.name))
     try:
-        points = figures.to_dict(study)
+        points = figured(study)
         text = json.dumps(points, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
         (folder / FIGURES).write_text(text + "\n", encoding="utf-8")
         files.write_text(folder / PAGE, rendering.to_html(found, points))
@@ -51,6 +51,11 @@ def write(folder: Path, study: Study, command: str | None = None) -> str:
         why = f"{type(error).__name__}: {shown(str(error), 120)}"
         return f"{PAGE} could not be made ({why}); the numbers are saved in {RECORD}."
     return ""
+
+
+def figured(study: Study) -> dict[str, Any]:
+    """What a page draws of a study, as JSON types: its figures, and what lights its ball."""
+    return figures.to_dict(study) | {"ball": ball.data(study)}
 
 
 def own(folder: Path) -> list[str]:

@@ -23,7 +23,7 @@ from fitmat.match.discernibility import SEPARATED
 from fitmat.match.regions import REGIONS
 from fitmat.match.sentences import CLOSE, SIMILAR
 from fitmat.models.metrics import METRICS
-from fitmat.reports import drawings
+from fitmat.reports import ball, drawings
 from fitmat.reports.rows import parameter_rows, prior_rows
 from fitmat.reports.snippets import snippets
 from fitmat.studies.cards import best, cards, title
@@ -42,7 +42,7 @@ SCRIPTS = (
 )
 """What a page runs, in this order: the chart library, then ours."""
 
-STYLES = ("uplot/uPlot.min.css", "page.css")
+STYLES = ("uplot/uPlot.min.css", "page.css", "ball.css")
 
 LICENCE = "uplot/LICENSE"
 """Of the chart library, which each page holds."""
@@ -61,10 +61,10 @@ def to_html(record: Mapping[str, Any], figures: Mapping[str, Any]) -> str:
 
     Args:
         record: JSON types, as `studies.record.to_dict` makes them.
-        figures: The same, of `studies.figures.to_dict`.
+        figures: The same, of `studies.figures.to_dict`, with the ball's data.
     """
     told, drawn = _shown(record), _shown(figures)
-    scripts = [_static(name) for name in SCRIPTS]
+    scripts = [*map(_static, SCRIPTS), _stage()]
     hashes = " ".join(f"'sha256-{_digest(script)}'" for script in scripts)
     return (
         _environment()
@@ -136,11 +136,18 @@ def load() -> None:
         _environment().get_template(name)
     for name in (*SCRIPTS, *STYLES, LICENCE):
         _static(name)
+    _stage()
 
 
 @functools.cache
 def _static(name: str) -> str:
     return files("fitmat.reports").joinpath("static", name).read_text(encoding="utf-8")
+
+
+@functools.cache
+def _stage() -> str:
+    """What draws the ball and the lobes, in a scope of its own."""
+    return f"(() => {{\n{ball.script()}\n{_static('stage.js')}}})();\n"
 
 
 def _digest(script: str) -> str:

@@ -28,8 +28,9 @@ from fitmat.match.match import Match
 from fitmat.measurements.samples import Measurements
 from fitmat.models.simulation import simulate
 from fitmat.reports import page, plot, rendering
+from fitmat.reports.page import figured
 from fitmat.reports.rows import parameter_rows
-from fitmat.studies import figures, record
+from fitmat.studies import record
 from fitmat.studies.cards import cards
 from fitmat.studies.findings import find
 from fitmat.studies.study import Study, study
@@ -60,7 +61,7 @@ def alone(posterior: Posterior) -> Study:
 
 
 def html_of(found: Study) -> str:
-    return rendering.to_html(record.to_dict(found), figures.to_dict(found))
+    return rendering.to_html(record.to_dict(found), figured(found))
 
 
 @pytest.fixture(scope="module")
@@ -166,8 +167,8 @@ def test_a_browser_may_run_the_scripts_of_the_page_and_fetch_nothing(report):
         "base-uri 'none'",
         "form-action 'none'",
     ]
-    assert len(scripts) == 8
-    assert re.findall(r"<script(?! type=\"application/json\")(.*?)>", report) == [""] * 8
+    assert len(scripts) == 9
+    assert re.findall(r"<script(?! type=\"application/json\")(.*?)>", report) == [""] * 9
     assert not re.search(r"@import|url\(|<link|<iframe|javascript:", report)
     assert Page(report).links == [link for link in Page(report).links if link.startswith("data:image/png")]
 
@@ -176,7 +177,7 @@ def test_the_data_of_a_page_are_those_of_the_files(report, studied):
     (text,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', report)
     assert not set("<>&") & set(text)
     data = json.loads(text)
-    assert data["figures"] == json.loads(json.dumps(figures.to_dict(studied)))
+    assert data["figures"] == json.loads(json.dumps(figured(studied)))
     assert data["record"]["match"]["verdict"] == studied.match.verdict
     assert data["record"]["fits"][1]["parameters"]["alpha"]["value"] == pytest.approx(
         studied.posteriors[1].fit.values[6]
@@ -201,9 +202,9 @@ def test_names_are_text(studied):
     )
     fit = dataclasses.replace(posterior.fit, measurements=measurements)
     one = alone(dataclasses.replace(posterior, fit=fit))
-    page_ = rendering.to_html(record.to_dict(one, evil), figures.to_dict(one))
+    page_ = rendering.to_html(record.to_dict(one, evil), figured(one))
     found = Page(page_)
-    assert found.tags.count("script") == 9
+    assert found.tags.count("script") == 10
     assert "49" not in found.text.partition(" samples")[0]
     assert not any(link.startswith("x") for link in found.links)
     assert "\u202e" not in page_

@@ -86,8 +86,8 @@ class Lobes {
         }
         const known = measured.length > 0 ? `Measured at ${measured.map(digits).join("°, ")}°.` : "Nothing was measured in the plane of incidence.";
         this.polar = svg("svg", { viewBox: "-110 -104 220 122", role: "img" });
-        const keys = names.map((name, k) => made("span", { class: `key ${k ? "other" : "one"}` }, name));
-        if (measured.length > 0) keys.push(made("span", { class: "key points" }, "measured"));
+        const keys = names.map((name, k) => made("span", { class: `kind ${k ? "other" : "one"}` }, name));
+        if (measured.length > 0) keys.push(made("span", { class: "kind points" }, "measured"));
         const lobe = made("figure", {}, this.polar, made("figcaption", { class: "keys" }, ...keys));
         this.slices = [...names, ...(names.length > 1 ? [`${names[0]} over ${names[1]}`] : [])].map((name) => this.slice(name));
         this.read = made("p", { class: "said", "aria-live": "polite" });
