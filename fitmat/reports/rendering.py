@@ -7,6 +7,7 @@ import base64
 import functools
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any
@@ -24,9 +25,9 @@ from fitmat.match.regions import REGIONS
 from fitmat.match.sentences import CLOSE, SIMILAR
 from fitmat.models.metrics import METRICS
 from fitmat.reports import ball, drawings
-from fitmat.reports.rows import parameter_rows, prior_rows
+from fitmat.reports.rows import brief_rows, parameter_rows, prior_rows
 from fitmat.reports.snippets import snippets
-from fitmat.studies.cards import best, cards, title
+from fitmat.studies.cards import best, cards, ordered, title
 from fitmat.text import visible
 from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAIL_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS
 
@@ -74,6 +75,7 @@ def to_html(record: Mapping[str, Any], figures: Mapping[str, Any]) -> str:
             figures=drawn,
             cards=cards(told),
             best=best(told),
+            fits=ordered(told),
             policy=POLICY.format(hashes),
             scripts=[Markup(script) for script in scripts],
             styles=[Markup(_static(name)) for name in STYLES],
@@ -118,9 +120,11 @@ def _environment() -> jinja2.Environment:
         "percent": _percent,
         "title": title,
         "held": _held,
+        "typeset": _typeset,
     }
     environment.globals |= {
         "rows": parameter_rows,
+        "brief_rows": brief_rows,
         "prior_rows": prior_rows,
         "snippets": snippets,
         "static_curves": drawings.curves,
@@ -179,8 +183,15 @@ def _rounded(thing: Any) -> Any:
 
 def _subscripted(symbol: str) -> Markup:
     """`k_d` as people write it, k with a small d below."""
-    letter, _, below = symbol.partition("_")
-    return Markup("{}<sub>{}</sub>").format(letter, below) if below else Markup("{}").format(symbol)
+    letter, _, rest = symbol.partition("_")
+    below, dot, after = rest.partition("·")
+    return Markup("{}<sub>{}</sub>{}").format(letter, below, dot + after) if below else Markup("{}").format(symbol)
+
+
+def _typeset(text: str) -> Markup:
+    """Words with indices below the line and powers above it: `cosθ_i`, `sr^(-1/3)`."""
+    found = re.sub(r"(?<=[θφωc])_([a-z])\b", r"<sub>\1</sub>", str(Markup.escape(text)))
+    return Markup(re.sub(r"\^\(([^)]*)\)", lambda power: f"<sup>{power[1].replace('-', '−')}</sup>", found))
 
 
 def _held(text: str) -> Markup:

@@ -26,6 +26,10 @@ BADGES = {
 """State of a parameter → what its badge says, how it looks, and what it means."""
 
 
+LEVELS = ("good", "unknown", "caution", "bad")
+"""How a badge looks, from what is known to what is not."""
+
+
 def parameter_rows(fit: Record, channels: Sequence[str]) -> list[dict[str, Any]]:
     """One line per reported number, as text: name, symbol, value, interval, remark, what it means.
 
@@ -61,6 +65,20 @@ def parameter_rows(fit: Record, channels: Sequence[str]) -> list[dict[str, Any]]
                     }
                 )
     return result
+
+
+def brief_rows(fit: Record, channels: Sequence[str], most: int = 6) -> list[dict[str, Any]]:
+    """Of each fitted parameter the line of the channel that is known worst; at most so many."""
+    found: dict[str, dict[str, Any]] = {}
+    for row in parameter_rows(fit, channels):
+        known = found.get(row["key"])
+        if row["kind"] == "fitted" and row["badge"] and (known is None or _doubt(row) > _doubt(known)):
+            found[row["key"]] = row
+    return list(found.values())[:most]
+
+
+def _doubt(row: Record) -> int:
+    return LEVELS.index(row["badge"][1])
 
 
 def _each(q: Record) -> Iterator[tuple[float, float, tuple[float, float], str]]:

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fitmat.reports.rows import parameter_rows
-from fitmat.studies.cards import BAD, CAUTION, GOOD, UNKNOWN, cards
+from fitmat.studies.cards import BAD, CAUTION, GOOD, UNKNOWN, cards, ordered
 from fitmat.text import visible
 
 Record = Mapping[str, Any]
@@ -68,7 +68,7 @@ def _shown(record: Record) -> list[Record]:
     first = [match["empirical"], match["microfacet"]] if match else []
     ranked = [candidate["model"] for candidate in choice["candidates"]] if choice else []
     chosen = list(dict.fromkeys((*first, *ranked, *fits)))[:SHOWN]
-    return [fit for name, fit in fits.items() if name in chosen]
+    return [fit for fit in ordered(record) if fit["model"] in chosen]
 
 
 def _doubts(out: Console, record: Record, shown: Sequence[Record]) -> None:

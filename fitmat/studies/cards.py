@@ -84,6 +84,12 @@ def best(record: Record) -> Record | None:
     return next((fits[name] for name in (*ranked, *fits) if name in fits), None)
 
 
+def ordered(record: Record) -> list[Record]:
+    """The record's fits, that of the material first."""
+    first = best(record)
+    return sorted(record["fits"], key=lambda fit: fit is not first)
+
+
 def _has_values(fit: Record) -> bool:
     every = [q["value"] for q in fit["parameters"].values()]
     return (

@@ -30,7 +30,7 @@ fitmat.chart = (place, options) => {
              y: {...distribution[options.yScale || "linear"], range: () => options.yRange}},
     axes: [{...axis, label: options.xLabel, size: 30, values: (u, splits) => splits.map(v => v + "°"), splits: degrees},
            {...axis, label: options.yLabel, size: 56, splits: options.ySplits ? (u, axis, min, max) => options.ySplits.filter(v => v >= min && v <= max) : options.yScale === "cube root" ? evenly : undefined,
-            values: (u, splits) => splits.map(v => v === null ? "" : short(v))}],
+            values: (u, splits) => splits.map(v => v === null || log && !told(v) ? "" : short(v))}],
     cursor: {drag: {x: Boolean(options.zoomed), y: false, setScale: false}, y: false, points: {show: false}},
     hooks: {
       drawClear: [u => under(u, options, shade, faint)],
@@ -55,6 +55,11 @@ fitmat.chart = (place, options) => {
   function short(value) {
     const size = Math.abs(value);
     return size !== 0 && (size >= 1e5 || size < 1e-3) ? value.toExponential(0) : String(Number(value.toPrecision(3)));
+  }
+  /* Powers of ten; of less than two decades also 2 and 5. */
+  function told(value) {
+    const power = Math.floor(Math.log10(value) + 1e-9), lead = Math.round(value / 10 ** power * 1e6) / 1e6;
+    return lead === 1 || options.yRange[1] / options.yRange[0] < 100 && (lead === 2 || lead === 5);
   }
   function degrees(u, axis, min, max) {
     const step = [1, 2, 5, 10, 15, 30].find(s => (max - min) / s <= Math.max(u.bbox.width / devicePixelRatio / 55, 2)) || 60;

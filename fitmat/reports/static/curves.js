@@ -67,6 +67,7 @@ fitmat.part("panels", (place, {figures}) => {
     const readout = element("p", {className: "readout", ariaLive: "polite"});
     const box = element("div", {className: "panel", tabIndex: 0, role: "group"}, element("h3", {textContent: title(c)}), upper, lower, readout);
     box.setAttribute("aria-label", said(c, names));
+    readout.textContent = "Point at a curve to read it.";
     return {box, upper, lower, readout};
   }
 

@@ -46,6 +46,17 @@ fitmat.part("maps", (place, {figures}) => {
       element("div", {className: "ends"}, element("span", {textContent: number(s.low, 3)}), element("span", {textContent: unit}), element("span", {textContent: number(s.high, 3)}))));
   }
 
+  function star(ctx, x, y) {
+    ctx.beginPath();
+    for (let k = 0; k < 10; k++) {
+      const radius = k % 2 ? 6 : 14, turn = Math.PI * (k / 5 - 0.5);
+      ctx.lineTo(x + radius * Math.cos(turn), y + radius * Math.sin(turn));
+    }
+    ctx.closePath();
+    ctx.fillStyle = "#f0b000"; ctx.strokeStyle = "#000000"; ctx.lineWidth = 1.5;
+    ctx.fill(); ctx.stroke();
+  }
+
   function one(m, s) {
     const size = 480, middle = size / 2, reach = middle - 8, list = values(m);
     const canvas = element("canvas", {width: size, height: size, tabIndex: 0, role: "img"});
@@ -67,8 +78,7 @@ fitmat.part("maps", (place, {figures}) => {
     ctx.strokeStyle = ctx.fillStyle = fitmat.colour("model0");
     ctx.lineWidth = 3;
     ctx.beginPath(); ctx.arc(middle + reach * m.theta_i / 90, middle, 13, 0, 7); ctx.stroke();
-    ctx.font = "26px system-ui, sans-serif"; ctx.textAlign = "center"; ctx.textBaseline = "middle";
-    ctx.fillText("☆", middle - reach * m.theta_i / 90, middle);
+    star(ctx, middle - reach * m.theta_i / 90, middle);
     const tell = i => { readout.textContent = `θₒ ${number(m.theta_o[i], 3)}°, azimuth ${number(m.phi[i], 3)}°: measured ${number(m.measured[state.channel][i])} sr⁻¹, residual ` +
       figures.models.map(name => `${number(m.residual[name][state.channel][i], 2)} sd (${name})`).join(", "); };
     canvas.addEventListener("pointermove", event => {
