@@ -14,7 +14,7 @@ from fitmat.measurements.lighting import PointSource
 ALLOWED: dict[str, tuple[str | int | None, ...]] = {
     "quantity": (None, "brdf", "brdf_cos", "reflectance_factor", "radiance", "panel_ratio", "signal"),
     "forward": (None, "positive", "negative"),
-    "specular_azimuth": (None, 180, 0),
+    "specular_azimuth": (None, 180, 0, 90, 270),
     "scale": (None, "linear", "percent", "db", "log10", "ln"),
 }
 """Option → its choices, the default first; the command line offers the same."""
@@ -40,8 +40,8 @@ class Options:
             degrees, refused where the range looks like radians.
         forward: Sign of theta_o on the mirror side of a positive theta_i, for files without azimuth; None for positive,
             asked for where theta_i is negative, doubted where the values peak on the other side.
-        specular_azimuth: Relative azimuth of the mirror side in the file, 180 or 0 degrees; None for 180, doubted where
-            the values peak on the other side.
+        specular_azimuth: Relative azimuth of the mirror side in the file, 180, 0, 90 or 270 degrees; None for 180,
+            doubted where the values peak on another side.
         intensity: Of the point source that caused radiances, W/sr.
         distance: Of that source, m.
         where: NAME=VALUE of the rows of a table to read; None for all.

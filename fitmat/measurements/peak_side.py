@@ -4,7 +4,7 @@ It turns nothing round: a retro-reflector and a mirror whose azimuth is counted 
 """
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -56,13 +56,26 @@ def with_peak_side(m: Measurements, unsaid_side: Sequence[str]) -> Measurements:
         )
         return dataclasses.replace(m, warnings=(*m.warnings, warning))
     if not back:
-        return _with_origin(m)
+        return _with_plane(m, confirm) or _with_origin(m)
     warning = (
         f"The values peak back towards the light, not in the mirror direction (at {_listed(back)} incidence). Either "
         f"the file counts its angles from the other side: pass {exchange}; or the sample is a retro-reflector: confirm "
         f"it with {confirm}."
     )
     return dataclasses.replace(m, warnings=(*m.warnings, warning))
+
+
+def _with_plane(m: Measurements, confirm: str) -> Measurements | None:
+    """With a warning where the curves peak at the mirror angle a quarter of a turn beside the plane of incidence."""
+    for azimuth in (90, 270):
+        if found := beside(m, azimuth):
+            warning = (
+                f"The values peak at the azimuth {azimuth}°, not in the mirror direction (at {_listed(found)} "
+                f"incidence). If the file counts its azimuth so, pass --specular-azimuth {azimuth}; if not, confirm it "
+                f"with {confirm}."
+            )
+            return dataclasses.replace(m, warnings=(*m.warnings, warning))
+    return None
 
 
 def _with_origin(m: Measurements) -> Measurements:
@@ -94,25 +107,43 @@ def upside_down(m: Measurements) -> tuple[float, ...]:
     return max(found, key=len)
 
 
+def beside(m: Measurements, azimuth: float) -> tuple[float, ...]:
+    """The same where they peak at the mirror angle, but at another relative azimuth, in degrees."""
+    if _mirrored(m):
+        return ()
+    turn = np.deg2rad(180.0 - azimuth)
+    c, s = np.cos(turn), np.sin(turn)
+    return _mirrored(dataclasses.replace(m, wo=m.wo @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])))
+
+
+def _mirrored(m: Measurements) -> tuple[float, ...]:
+    """Incidences in degrees whose curves peak in the mirror direction."""
+    return tuple(np.rad2deg(at) for at, angle, value in _in_plane(m) if _peaks(angle, value, at, min(NEAR, 0.75 * at)))
+
+
 def _peaking(m: Measurements, where: Callable[[float], float]) -> tuple[float, ...]:
     """Incidences in degrees whose curves peak at an angle; none if any has a peak in the mirror direction."""
-    channel = int(m.valid.sum(axis=0).argmax())
-    phi, signed = m.phi, m.signed_theta_o
-    used = m.valid[:, channel] & (np.minimum(phi, np.pi - phi) < ASIDE)
     back = []
-    for lit in incidences(m.wi, used):
-        at = np.deg2rad(lit.theta_i_deg)
-        if not TILTED[0] <= at <= TILTED[1]:
-            continue
+    for at, angle, value in _in_plane(m):
         if abs(where(at) - at) < 2 * NEAR and where(at) > 0:
             continue
-        angle, value = _curve(signed[lit.rows], m.value[lit.rows, channel])
         if _peaks(angle, value, at, min(NEAR, 0.75 * at)):
             return ()
         apart = 0.5 * abs(where(at) - at)
         if _peaks(angle, value, where(at), min(NEAR, apart, 0.75 * abs(where(at)) or apart)):
-            back.append(lit.theta_i_deg)
+            back.append(np.rad2deg(at))
     return tuple(back)
+
+
+def _in_plane(m: Measurements) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
+    """Incidence, signed angles and values of the curves in the plane of incidence that are judged, in radians."""
+    channel = int(m.valid.sum(axis=0).argmax())
+    phi, signed = m.phi, m.signed_theta_o
+    used = m.valid[:, channel] & (np.minimum(phi, np.pi - phi) < ASIDE)
+    for lit in incidences(m.wi, used):
+        at = np.deg2rad(lit.theta_i_deg)
+        if TILTED[0] <= at <= TILTED[1]:
+            yield float(at), *_curve(signed[lit.rows], m.value[lit.rows, channel])
 
 
 def _listed(angles: Sequence[float]) -> str:

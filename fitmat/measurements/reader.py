@@ -112,7 +112,7 @@ def read(
             the range looks like radians.
         forward: Sign of theta_o on the mirror side of a positive theta_i where there is no azimuth: "positive" (the
             default; asked for where theta_i is negative) or "negative".
-        specular_azimuth: Relative azimuth of the mirror side in the file, 180 (the default) or 0.
+        specular_azimuth: Relative azimuth of the mirror side in the file, 180 (the default), 0, 90 or 270.
         intensity: Of the point source that lit the sample, W/sr, where radiances in W/(m² sr) were read.
         distance: Of that source from the sample, m.
         where: Read only rows in which a column has this value, "material=Alu".

@@ -141,6 +141,13 @@ def mirrored_azimuth(t: Table, rng: np.random.Generator) -> None:
         _angle(t, "theta_o", -t.angles["theta_o"])
 
 
+def turned_azimuth(t: Table, rng: np.random.Generator) -> None:
+    if "phi" in t.angles:
+        _angle(t, "phi", (t.angles["phi"] + rng.choice([90.0, 270.0])) % 360.0)
+    else:
+        mirrored_azimuth(t, rng)
+
+
 def satellite_names(t: Table, rng: np.random.Generator) -> None:
     names = {"theta_i": "SZA", "theta_o": "VZA", "phi": "RAA", "brdf": "BRDF", "reflectance_factor": "BRF"}
     t.written = {names[key]: cells for key, cells in t.written.items()}
@@ -242,7 +249,15 @@ def wavelength_in_micrometres(t: Table, rng: np.random.Generator) -> None:
 
 KINDS: tuple[Callable[[Table, np.random.Generator], None], ...] = (
     *(azimuth_in_radians, everything_in_radians, radians_in_the_header, a_whole_turn, elevation_by_name),
-    *(elevation_of_the_sensor, light_on_the_negative_side, mirrored_azimuth, satellite_names, decibels, logarithms),
+    *(
+        elevation_of_the_sensor,
+        light_on_the_negative_side,
+        mirrored_azimuth,
+        turned_azimuth,
+        satellite_names,
+        decibels,
+        logarithms,
+    ),
     *(
         percent,
         thousands,

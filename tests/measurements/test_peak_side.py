@@ -56,6 +56,23 @@ def test_a_mirror_side_at_azimuth_0_is_said_with_its_flag():
     np.testing.assert_allclose(turned.wo, right.wo, atol=1e-12)
 
 
+@pytest.mark.parametrize("azimuth", [90, 270])
+def test_a_mirror_side_a_quarter_of_a_turn_away_is_said_with_its_flag(azimuth: int):
+    """Azimuths counted from the axis across the plane of incidence, all eight of them measured."""
+    columns = (part.ravel() for part in np.meshgrid(INCIDENCES, SENSOR[SENSOR > 0], 45.0 * np.arange(8), indexing="ij"))
+    theta_i, theta_o, phi = columns
+    lobe = fm.directions(theta_i, degrees=True) * [-1.0, 1.0, 1.0]
+    away = np.degrees(np.arccos(np.clip(np.sum(lobe * fm.directions(theta_o, phi, degrees=True), axis=1), -1, 1)))
+    right = {"theta_i": theta_i, "theta_o": theta_o, "phi": phi, "brdf": 0.1 + np.exp(-((away / 8.0) ** 2))}
+    turned = right | {"phi": (phi + azimuth - 180.0) % 360.0}
+    (warning,) = fm.read(turned).warnings
+    assert f"peak at the azimuth {azimuth}°, not in the mirror direction (at 20°, 40°, 60° incidence)" in warning
+    assert f"pass --specular-azimuth {azimuth}; if not, confirm it with --specular-azimuth 180." in warning
+    read = fm.read(turned, specular_azimuth=azimuth)
+    assert read.warnings == fm.read(right).warnings == ()
+    np.testing.assert_allclose(read.wo, fm.read(right).wo, atol=1e-12)
+
+
 def test_a_negative_mirror_side_is_said_with_its_flag():
     (warning,) = fm.read(table(mirrored)).warnings
     assert "pass --forward negative; or" in warning

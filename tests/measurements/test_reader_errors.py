@@ -175,7 +175,7 @@ BAD_OPTIONS: dict[str, tuple[str, dict[str, Any], str]] = {
         "theta_i = 200.0, expected −180 to 180",
     ),
     "forward": (GOOD, {"forward": "up"}, "forward = 'up' .*expected 'positive' or 'negative'"),
-    "specular azimuth": (GOOD, {"specular_azimuth": 90}, "specular_azimuth = 90 .*expected 180 or 0"),
+    "specular azimuth": (GOOD, {"specular_azimuth": 45}, "specular_azimuth = 45 .*expected 180 or 0 or 90 or 270"),
     "quantity denied": (
         GOOD,
         {"quantity": "brdf_cos"},

@@ -65,7 +65,7 @@ ForwardFlag = Annotated[
 SpecularAzimuthFlag = Annotated[
     int | None,
     typer.Option(
-        help="Relative azimuth phi of the mirror side in the file: 180 (default) or 0.",
+        help="Relative azimuth phi of the mirror side in the file: 180 (default), 0, 90 or 270.",
         metavar="PHI",
         show_default=False,
         rich_help_panel=FILE,

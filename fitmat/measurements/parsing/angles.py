@@ -115,25 +115,26 @@ def _in_radians(
 def _azimuths(table: Table, angles: Mapping[str, np.ndarray], options: Options) -> tuple[np.ndarray, np.ndarray, str]:
     """phi_i, phi_o in radians for positive zenith angles, and the convention in words."""
     zero = np.zeros_like(angles["theta_i"])
-    turned, forward = options.specular_azimuth == 0, options.forward or "positive"
+    side, forward = options.specular_azimuth, options.forward or "positive"
     if not angles.keys() & {"phi", "phi_o"}:
-        if turned:
+        if side not in (None, 180):
             expected = "expected only with azimuth columns. Use forward= (--forward) for the sign of theta_o."
-            raise ReadError(f"{table.source}: specular_azimuth = 0 without an azimuth column, {expected}")
-        side = np.pi if forward == "positive" else 0.0
+            raise ReadError(f"{table.source}: specular_azimuth = {side} without an azimuth column, {expected}")
+        opposite = np.pi if forward == "positive" else 0.0
         note = f"No azimuth column: in-plane, {forward} theta_o is forward (mirror side)"
         note += ". Of a negative theta_i it is the other sign." if (angles["theta_i"] < 0).any() else "."
-        return zero, zero + side, note
+        return zero, zero + opposite, note
     if options.forward is not None:
         expected = "expected only without azimuth columns. Use specular_azimuth= (--specular-azimuth)."
         raise ReadError(f"{table.source}: forward = {options.forward} beside azimuth columns, {expected}")
     given = "phi" if "phi" in angles else "phi_o − phi_i"
-    note = f"Relative azimuth {given}: {0 if turned else 180}° is the mirror side"
-    note += ", turned by 180°." if turned else "."
+    turned = 180 - (180 if side is None else side)
+    note = f"Relative azimuth {given}: {180 - turned}° is the mirror side"
+    note += f", turned by {turned}°." if turned else "."
     if (angles["theta_i"] < 0).any() or (angles["theta_o"] < 0).any():
         note += " Negative zenith angles turn their azimuth by 180°."
     phi_o = angles["phi"] if "phi" in angles else angles["phi_o"]
-    return angles.get("phi_i", zero), phi_o + np.pi if turned else phi_o, note
+    return angles.get("phi_i", zero), phi_o + np.deg2rad(turned) if turned else phi_o, note
 
 
 def unsaid_side(columns: Collection[str], options: Options) -> tuple[str, ...]:
