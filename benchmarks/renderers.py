@@ -1,22 +1,26 @@
 """What is exported, executed: how far its values are from the model's own; writes the table of docs/exports.md.
 
-`python benchmarks/renderers.py`; needs Chromium and Mitsuba.
+`python benchmarks/renderers.py`; needs Chromium, Mitsuba and the wheel MaterialX.
 """
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import jax
+import numpy as np
 
 import fitmat as fm
 from fitmat.exports import browser, mitsuba
+from fitmat.exports.material import Chosen
+from fitmat.exports.targets import TARGETS
 from fitmat.exports.translation import translated
 from fitmat.exports.verification import Difference, compared, directions, exact, run
 from fitmat.models.base import AbstractBRDF
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 from exports.test_glsl import NAMES, SHARP, own, sharp
-from exports.test_mitsuba import SAME
+from exports.test_mitsuba_export import SAME
 from tables import replace_between, to_markdown
 
 NARROWER = {"alpha": 0.001, "alpha_x": 0.001, "exponent": 1e5, "exponent_u": 1e5, "b": 1e-10, "roughness": 0.03}
@@ -45,6 +49,36 @@ def mitsubas() -> list[tuple[str, AbstractBRDF, Difference]]:
     return rows
 
 
+COLOURED: dict[str, Any] = {"kd": np.array([0.3, 0.2, 0.1]), "ks": np.ones(3)}
+METAL: dict[str, Any] = {"eta": np.array([0.2, 0.4, 1.4]), "kappa": np.array([3.9, 2.4, 1.6])}
+APPROXIMATED = {
+    "coloured": fm.model("lambert", kd=COLOURED["kd"]),
+    "alpha 0.15": fm.model("lambert+ggx", alpha=0.15, **COLOURED),
+    "alpha 0.1": fm.model("lambert+beckmann", alpha=0.1, **COLOURED),
+    "gold, alpha 0.3": fm.model("ggx-conductor", alpha=0.3, **METAL),
+    "exponent 50": fm.model("lambert+blinn-phong", kd=COLOURED["kd"], ks=np.full(3, 0.05), exponent=50.0),
+}
+"""What MaterialX, OpenPBR and glTF hold as the closest."""
+
+
+def approximated() -> list[list[str]]:
+    """Rows of the targets that get the closest material: its values, run there, beside the model's own."""
+    rows = []
+    for target in ("materialx", "openpbr", "gltf"):
+        for name, model in APPROXIMATED.items():
+            what, made = Chosen(model), TARGETS[target]
+            form = made.translate(what)
+            found = made.difference(what, form)
+            if found is None:
+                sys.exit(f"{target} is not run here: needs the wheel MaterialX; the table stays as it is")
+            closest = made.facts(form).get("closest")
+            said = f"ΔE2000 {closest['delta_e']:.2f}" if closest else "the same"
+            executed = "yes" if target != "gltf" else "its formulas, no viewer"
+            rows.append([made.title, f"`{model.name}`, {name}: {said}", *cells(found), "", executed])
+            print(*rows[-1], flush=True)
+    return rows
+
+
 def main() -> None:
     """Run all shaders in one browser, and compare."""
     program = browser.program()
@@ -62,6 +96,7 @@ def main() -> None:
         for name, first, second in zip(NAMES, found[: len(NAMES)], found[len(NAMES) :], strict=True)
     ]
     rows += [["Mitsuba 3", f"`{model.name}`, {name}", *cells(d), "", "yes"] for name, model, d in mitsubas()]
+    rows += approximated()
     headings = ["target", "model", "worst", "mean", "worst at θ_i, θ_o, φ", "worst, narrower", "executed"]
     text = to_markdown(headings, rows) + f"\n\n{len(wi)} pairs of directions, {executor}."
     replace_between(Path(__file__).parents[1] / "docs" / "exports.md", "exports", text)

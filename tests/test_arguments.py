@@ -298,6 +298,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             "into": (None, "lambort", 5, [], MEASURED),
             "metric": (None, *TEXT, "far"),
             "fixed": KNOWN["fixed"],
+            "weight": (*TEXT, "heavy"),
         },
     ),
     "study": (

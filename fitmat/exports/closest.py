@@ -17,12 +17,16 @@ from fitmat.match.distances import measure_distances
 from fitmat.match.imitation import Imitation, imitate
 from fitmat.measurements.samples import default_channels
 from fitmat.models.base import AbstractBRDF
+from fitmat.models.metrics import Weight
 from fitmat.models.parameters import entries, vector
 from fitmat.models.values import at
 from fitmat.text import brief
 
 METRIC = "cube-root"
 """What is minimised: the metric closest to what eyes judge."""
+
+WEIGHTS: tuple[Weight, ...] = ("solid", "projected")
+"""Of directions: each alike, or as light arrives and is seen; of the two that counts whose lit spheres look closer."""
 
 NEARLY = 1.05
 """Of several ways in which a target may hold a material the first counts whose distance is so many times the least."""
@@ -110,12 +114,21 @@ def closest(chosen: Chosen, into: AbstractBRDF, ways: Sequence[Mapping[str, Arra
         ways: Parameters of it that are held, one set for each way in which it may be meant, as a metal or as a
             dielectric; the first counts that is within `NEARLY` of the best.
     """
-    found = [imitate(chosen.model, into, METRIC, fixed=held) for held in ways]
+    tried = [_imitated(chosen, into, ways, weight) for weight in WEIGHTS]
+    seen = [judged(chosen, found.model) for found, _ in tried]
+    k = int(np.argmin([one.delta_e for one in seen]))
+    found, held = tried[k]
+    return dataclasses.replace(seen[k], ci95=_intervals(found, chosen, held), converged=found.converged)
+
+
+def _imitated(
+    chosen: Chosen, into: AbstractBRDF, ways: Sequence[Mapping[str, ArrayLike]], weight: Weight
+) -> tuple[Imitation, frozenset[str]]:
+    """The first way that is nearly as close as the best, and what is held in it."""
+    found = [imitate(chosen.model, into, METRIC, fixed=held, weight=weight) for held in ways]
     enough = NEARLY * min(one.distance for one in found)
-    best = next(k for k, one in enumerate(found) if one.distance <= enough)
-    judged_best = judged(chosen, found[best].model)
-    ci95 = _intervals(found[best], chosen, frozenset(ways[best]))
-    return dataclasses.replace(judged_best, ci95=ci95, converged=found[best].converged)
+    first = next(k for k, one in enumerate(found) if one.distance <= enough)
+    return found[first], frozenset(ways[first])
 
 
 def judged(chosen: Chosen, model: AbstractBRDF) -> Closest:

@@ -37,7 +37,7 @@ def carried(found: Imitation, source: AbstractBRDF, draws: Float[np.ndarray, "m 
     moved = np.flatnonzero(np.ptp(draws, axis=0) > 0.0)
     result = np.tile(t, (len(draws), 1))
     if len(free) and len(moved):
-        own, other = _curvatures(found, source, quadrature(source, found.metric), free, moved)
+        own, other = _curvatures(found, source, quadrature(source, found.metric, found.weight), free, moved)
         slope = -np.linalg.lstsq(own, other, rcond=1e-9)[0]
         result[:, free] += (draws[:, moved] - s[moved]) @ slope.T
     return np.clip(result, lower, upper)

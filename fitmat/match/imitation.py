@@ -6,7 +6,7 @@ No measurement takes part: the rows are directions of a quadrature and the value
 import dataclasses
 import itertools
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, get_args
 
 import equinox as eqx
 import jax
@@ -28,7 +28,7 @@ from fitmat.maths.programs import program
 from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.conversion import exponent_from_alpha
-from fitmat.models.metrics import METRICS
+from fitmat.models.metrics import METRICS, Weight
 from fitmat.models.parameters import check_range, entries, vector, with_vector
 from fitmat.models.registry import model
 from fitmat.models.values import at, values, widths
@@ -36,6 +36,8 @@ from fitmat.text import brief
 
 LEAST_SQUARES = tuple(name for name, metric in METRICS.items() if metric.kind != "light")
 """Metrics that are sums of squares, and can be minimised as such."""
+
+WEIGHTS: tuple[str, ...] = get_args(Weight)
 
 NODES = (24, 12)
 """Of the quadrature over ω_o, in zenith and azimuth, at each of the incidences of `regions.incidence_panels`."""
@@ -60,6 +62,7 @@ class Imitation:
         metric: Key of `LEAST_SQUARES`: what was minimised.
         distance: What remains in that metric, in its unit; of the imitating from the imitated model.
         converged: Whether the solver ended at a minimum.
+        weight: Of pairs of directions, where it was not the metric's own.
     """
 
     model: AbstractBRDF
@@ -67,6 +70,7 @@ class Imitation:
     metric: str
     distance: float
     converged: bool
+    weight: Weight | None = None
 
     __repr__ = brief
 
@@ -88,6 +92,7 @@ def imitate(
     metric: str = "cube-root",
     *,
     fixed: Mapping[str, ArrayLike] | None = None,
+    weight: Weight | None = None,
 ) -> Imitation:
     """The parameters with which a model best imitates another, over all pairs of directions and without noise.
 
@@ -99,6 +104,7 @@ def imitate(
         into: The imitating model: a name, or a model whose shapes and static choices are used.
         metric: One of `LEAST_SQUARES`.
         fixed: Parameters of the imitating model to hold, by name.
+        weight: Of pairs of directions, as in `metrics.Metric`, where it is not the metric's own.
 
     Raises:
         FitmatError: the metric is no sum of squares, or a model, a parameter or a value is not known.
@@ -112,9 +118,10 @@ def imitate(
     arguments.kind("into", into, str, AbstractBRDF)
     arguments.named(fixed=fixed)
     arguments.choice("metric", metric, LEAST_SQUARES)
+    arguments.choice("weight", weight, (None, *WEIGHTS))
     source = surface(what.model if isinstance(what, Fit) else what)
     template, moved = _template(source, into, dict(fixed or {}))
-    rows = quadrature(source, metric)
+    rows = quadrature(source, metric, weight)
     nodes = _nodes(template, moved.index, float(widths(source, vector(source)[None])[0]))
     found = _solve(template, rows, _started(template, nodes, moved, rows, metric), moved)
     ends, square, converged = (np.asarray(part) for part in found)
@@ -122,7 +129,7 @@ def imitate(
     mean_square = METRICS[metric].kind == "mean square"
     distance = 2.0 / np.pi * square[best] if mean_square else np.sqrt(square[best])
     chosen = with_vector(template, ends[best])
-    return Imitation(chosen, source.name, metric, float(distance), bool(converged[best]))
+    return Imitation(chosen, source.name, metric, float(distance), bool(converged[best]), weight)
 
 
 def _template(
@@ -235,17 +242,18 @@ def _solve(
     return mapped(refined, jnp.asarray(starts))
 
 
-def quadrature(source: AbstractBRDF, metric: str) -> Target:
-    """The quadrature, dense where the imitated lobe is."""
+def quadrature(source: AbstractBRDF, metric: str, weight: Weight | None = None) -> Target:
+    """The pairs of directions and what is imitated there, dense where the imitated lobe is; see `imitate`."""
+    measure = METRICS[metric] if weight is None else dataclasses.replace(METRICS[metric], weight=weight)
     theta, solid = incidence_panels()
     width = float(widths(source, vector(source)[None])[0])
     rules = lobe_rules(theta, width, isotropic=source.isotropic, nodes=NODES)
     wi = np.concatenate([np.broadcast_to(rule.wi, rule.wo.shape) for rule in rules])
     wo = np.concatenate([rule.wo for rule in rules])
     f = at(source, wi, wo)
-    of_light = np.repeat(incidence_weight(METRICS[metric], theta, solid), len(rules) // len(theta))
-    of_sensor = [direction_weight(METRICS[metric], rule) for rule in rules]
-    weight = np.concatenate([light * part for light, part in zip(of_light, of_sensor, strict=True)])
-    norm = weight @ ((f**2).mean(axis=1) if METRICS[metric].kind == "relative" else np.ones(len(f)))
-    root = np.sqrt(weight / norm / f.shape[1])[:, None]
+    of_light = np.repeat(incidence_weight(measure, theta, solid), len(rules) // len(theta))
+    of_sensor = [direction_weight(measure, rule) for rule in rules]
+    every = np.concatenate([light * part for light, part in zip(of_light, of_sensor, strict=True)])
+    norm = every @ ((f**2).mean(axis=1) if METRICS[metric].kind == "relative" else np.ones(len(f)))
+    root = np.sqrt(every / norm / f.shape[1])[:, None]
     return Target(wi, wo, root, f, np.array(LEAST_SQUARES.index(metric)))

@@ -73,6 +73,10 @@ def within(theta_i: np.ndarray, theta_o: np.ndarray) -> np.ndarray:
     return np.maximum(theta_i, theta_o) <= np.deg2rad(NGAN_DEG)
 
 
+Weight = Literal["solid", "within", "projected"]
+"""Of pairs of directions, see `Metric`."""
+
+
 @dataclass(frozen=True)
 class Metric:
     """How the values of two BRDFs are compared: T = ∫∫ |t(f₁) − t(f₂)|ᵖ w over V = ∫∫ w, the same pairs of directions.
@@ -85,7 +89,7 @@ class Metric:
     """
 
     transform: Callable[[Any, Any, Any], Any]
-    weight: Literal["solid", "within", "projected"]
+    weight: Weight
     kind: Literal["relative", "rms", "mean square", "light"]
     words: str
 
