@@ -18,3 +18,7 @@ class ModelError(FitmatError):
 
 class OutputError(FitmatError):
     """A result cannot be written where it was asked for."""
+
+
+class ReadAs(UserWarning):
+    """A parameter was given by another name than the model's; the sentence says in which convention it was read."""

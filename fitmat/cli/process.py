@@ -12,7 +12,7 @@ from typing import IO, Any, NoReturn
 
 import typer
 
-from fitmat.errors import FitmatError
+from fitmat.errors import FitmatError, ReadAs
 from fitmat.text import for_shell, visible
 
 WRONG_INPUT, NOBODY_READS = 1, 141
@@ -28,10 +28,18 @@ def prepare_streams() -> None:
     _open_what_is_closed()
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
+        warnings.simplefilter("once", ReadAs)
+        warnings.showwarning = _told
     logging.disable(logging.WARNING)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
+
+
+def _told(message: Warning | str, *where: object) -> None:
+    """A warning as a sentence, without the place in the program."""
+    del where
+    print(visible(str(message)), file=sys.stderr)
 
 
 def _open_what_is_closed() -> None:

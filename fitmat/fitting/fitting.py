@@ -27,6 +27,7 @@ from fitmat.fitting.starts import starting_points
 from fitmat.measurements.noise import measured_noise
 from fitmat.measurements.reader import measurements_of
 from fitmat.measurements.samples import Measurements
+from fitmat.models import names
 from fitmat.models.around.noise import LEAST_ABSOLUTE, Noisy
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import check_range, entries, vector, with_vector
@@ -48,7 +49,7 @@ def fit(
     Args:
         measurements: From `fitmat.read`, or a file that needs no options.
         to: A model name ("lambert+ggx"), or a model whose shapes and static choices are used.
-        fixed: Parameters to hold, by name: `{"ks": 1.0}`.
+        fixed: Parameters to hold, by name, also as others call them: `{"ks": 1.0}`, `{"roughness": 0.4}`.
         priors: What is known beforehand, by name: centre and standard deviation, `{"eta": (1.5, 0.05)}`; see
             `fitmat.fitting.priors`.
         loss: What is minimised, by name (`fitmat.fitting.losses`); only a likelihood supports a posterior.
@@ -82,10 +83,11 @@ def fit(
     chosen = find_loss(loss)
     shown = seen(template, measurements)
     known = dict(priors or {})
-    refuse_idle(known, fixed or {}, chosen)
+    fixed = names.own(template.name, {e.name for e in entries(template)}, fixed or {})
+    refuse_idle(known, fixed, chosen)
     if chosen.infers_noise:
         shown, known = Noisy(shown), _noise_priors(measurements) | known
-    held = _held(shown, fixed or {})
+    held = _held(shown, fixed)
     moved = coordinates(shown, held)
     needed = moved.count + 2
     found_noise = measured_noise(measurements)

@@ -1,4 +1,4 @@
-"""Conversion: the exponent n of a Blinn–Phong lobe from the slope α of a microfacet lobe, and back.
+"""Conversion: one convention's parameter from another's: exponent and slope, roughness, specular, metallic.
 
 It fits nothing; `imitation` finds the best parameters of a model for another. The closed form compares the peaks of two
 distributions of normals; what a fit finds differs from it by a smooth curve in the width, which `fitted_exponent` and
@@ -79,6 +79,53 @@ def fitted_alpha(exponent: ArrayLike) -> np.ndarray:
         0.048
     """
     return _corrected(alpha_from_exponent(np.asarray(exponent, float)), ALPHA_CORRECTION)
+
+
+def alpha_from_roughness(roughness: Numbers) -> Numbers:
+    """α = roughness²: the artists' roughness, of Disney, glTF, OpenPBR, Blender, Unreal.
+
+    B. Burley, Physically based shading at Disney, 2012, section 5.4.
+
+    Example:
+        >>> alpha_from_roughness(0.5)
+        0.25
+    """
+    return roughness**2
+
+
+def alpha_from_glossiness(glossiness: Numbers) -> Numbers:
+    """α = (1 − glossiness)²: glossiness is 1 − roughness (KHR_materials_pbrSpecularGlossiness, appendix).
+
+    Example:
+        >>> alpha_from_glossiness(0.5)
+        0.25
+    """
+    return alpha_from_roughness(1.0 - glossiness)
+
+
+def f0_from_specular(specular: Numbers) -> Numbers:
+    """F0 = 0.08 specular: 0.5 is 4 %, an index of 1.5 (Burley 2012, section 5.5; Blender, Unreal).
+
+    Example:
+        >>> f0_from_specular(0.5)
+        0.04
+    """
+    return 0.08 * specular
+
+
+def diffuse_from_metallic(base_color: Numbers, metallic: Numbers) -> Numbers:
+    """kd = (1 − metallic) base_color (glTF 2.0, appendix B)."""
+    return (1.0 - metallic) * base_color
+
+
+def f0_from_metallic(base_color: Numbers, metallic: Numbers) -> Numbers:
+    """F0 = 0.04 + metallic (base_color − 0.04) (glTF 2.0, appendix B).
+
+    Example:
+        >>> f0_from_metallic(0.9, 1.0)
+        0.9
+    """
+    return 0.04 + metallic * (base_color - 0.04)
 
 
 def _corrected(width: np.ndarray, coefficients: tuple[float, ...]) -> np.ndarray:

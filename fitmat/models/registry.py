@@ -14,6 +14,7 @@ from jaxtyping import ArrayLike
 
 from fitmat import arguments
 from fitmat.errors import ModelError
+from fitmat.models import names
 from fitmat.models.around.coat import RoughCoat, SmoothCoat, Varnish
 from fitmat.models.around.plastic import Plastic
 from fitmat.models.around.tilt import Tilted
@@ -155,7 +156,6 @@ LOBES: dict[str, Lobe] = {
     "tilt": Lobe(Tilted, "cover"),
 }
 
-
 WALKS: dict[str, tuple[str, Estimator]] = {
     f"{normals.label}-{estimator}{fresnel.suffix}": (normals.label + fresnel.suffix, estimator)
     for normals in (GGX, Beckmann)
@@ -236,8 +236,8 @@ def model(name: str, *, masking: str | None = None, channels: int | None = None,
             may be tilted, "tilt-over-lambert+ggx"; `fitmat models` lists the lobes. One may be of `WALKS`.
         masking: "correlated", "separable" or "v-cavity" for the microfacet lobes; None keeps each lobe's own.
         channels: Give per-channel parameters this many values; None keeps what is passed.
-        **values: Parameters by name; the rest take defaults. A name that two lobes share means both, or one of them
-            as `**{"ggx.ks": 0.5}`.
+        **values: Parameters by name, also as others call them (`names.READINGS`); the rest take defaults. A name that
+            two lobes share means both, or one of them as `**{"ggx.ks": 0.5}`.
 
     Returns:
         A frozen module; call it through `fitmat.evaluate`.
@@ -258,6 +258,7 @@ def model(name: str, *, masking: str | None = None, channels: int | None = None,
     lobes = covers + parts
     known = {key for part in lobes for key in LOBES[part].defaults()}
     dotted = {f"{part}.{key}" for part in lobes for key in LOBES[part].defaults()}
+    values = names.own(name, known | dotted, values)
     for key in values:
         if key not in known | dotted:
             raise ModelError(f"model {name!r} has no parameter {key!r}; it has {', '.join(sorted(known))}.")

@@ -16,6 +16,7 @@ from fitmat.fitting.losses import loss as find_loss
 from fitmat.fitting.priors import DISCREPANCY, refuse_idle
 from fitmat.judgement.choice import every_model
 from fitmat.measurements.samples import Measurements
+from fitmat.models import names as other_names
 from fitmat.models.parameters import entries
 from fitmat.models.registry import LOBES, lobe_names, model, normalised
 
@@ -97,16 +98,19 @@ def plan(
     names = model_names(asked, measurements)
     prepared = known.prepare_known(names, measurements, ior=ior, tilt=tilt)
     having = {name: {e.name for e in entries(model(name))} | _BESIDE for name in prepared}
-    _refuse_foreign("--fix", fixed or {}, {name: has - _BESIDE for name, has in having.items()})
+    own = {name: other_names.own(name, has - _BESIDE, fixed or {}) for name, has in having.items()}
+    read = {key for found in own.values() for key in (fixed or {}) if key not in found}
+    unread = {key: value for key, value in (fixed or {}).items() if key not in read}
+    _refuse_foreign("--fix", unread, {name: has - _BESIDE for name, has in having.items()})
     _refuse_foreign("--prior", priors or {}, having)
-    for held in prepared.values():
-        _refuse_known(fixed or {}, held)
+    for name, held in prepared.items():
+        _refuse_known(own[name], held)
     masked = [n for n in prepared if any(LOBES[part].has_masking for part in lobe_names(n))]
     if masking is not None and not masked:
         raise ModelError(f"--masking {masking}: none of {', '.join(prepared)} has a masking to choose.")
     jobs = {
         name: {
-            "fixed": {**held, **_of(fixed, having[name] - _BESIDE)},
+            "fixed": {**held, **_of(own[name], having[name] - _BESIDE)},
             "priors": _of(priors, having[name]),
             "loss": loss,
             **({"masking": masking} if masking is not None and name in masked else {}),
