@@ -85,10 +85,11 @@ class Lobes {
             rows.push(choice("Channel", named, (value) => this.put("channel", Number(value))));
         }
         const known = measured.length > 0 ? `Measured at ${measured.map(digits).join("°, ")}°.` : "Nothing was measured in the plane of incidence.";
-        this.polar = svg("svg", { viewBox: "-110 -104 220 122", role: "img" });
+        this.polar = svg("svg", { viewBox: "-110 -104 220 108", role: "img" });
+        this.outer = made("span");
         const keys = names.map((name, k) => made("span", { class: `kind ${k ? "other" : "one"}` }, name));
         if (measured.length > 0) keys.push(made("span", { class: "kind points" }, "measured"));
-        const lobe = made("figure", {}, this.polar, made("figcaption", { class: "keys" }, ...keys));
+        const lobe = made("figure", {}, this.polar, made("figcaption", {}, this.outer, made("br"), ...keys));
         this.slices = [...names, ...(names.length > 1 ? [`${names[0]} over ${names[1]}`] : [])].map((name) => this.slice(name));
         this.read = made("p", { class: "said", "aria-live": "polite" });
         this.root.replaceChildren(
@@ -143,8 +144,8 @@ class Lobes {
             const [cx, cy] = at(theta, value).split(",");
             return svg("circle", { class: "points", cx, cy, r: 1.1 });
         });
-        const label = svg("text", { x: 0, y: 12, "text-anchor": "middle" }, `outer circle: ${digits(most)} sr⁻¹, radius: ${name}`);
-        this.polar.replaceChildren(...[1, 2, 3, 4].map((k) => ring(25 * k)), ...rays, light, ...lines, ...dots, label);
+        this.outer.textContent = `outer circle: ${digits(most)} sr⁻¹, radius: ${name}`;
+        this.polar.replaceChildren(...[1, 2, 3, 4].map((k) => ring(25 * k)), ...rays, light, ...lines, ...dots);
         const roles = this.ball.data.models.map(({ role }, k) => `${role} up to ${digits(Math.max(...values[k]))}`).join(", ");
         this.polar.setAttribute("aria-label", `BRDF in the plane of incidence, light from ${digits(this.thetaI)}°: ${roles} per steradian; ${points.length} measured points.`);
     }
