@@ -19,6 +19,9 @@ DECADES = 1.5
 PANEL, GAP, COLUMNS = (230.0, 150.0), 34.0, 3
 """Width and height of a panel, the space between two, and how many stand in a row."""
 
+DOTS = 150
+"""At most so many points of a panel are drawn, evenly spread."""
+
 ABOVE = 3.0
 """A fit may go past the highest measured value by this factor, not more."""
 
@@ -60,7 +63,8 @@ def _panel(one: Record, models: Sequence[str], channel: int, k: int) -> Markup:
         )
         for n, fit in enumerate(fits)
     ]
-    ends = [at(x, y).split(",") for x, y in zip(one["theta_o"], one["measured"][channel], strict=True) if y is not None]
+    points = [(x, y) for x, y in zip(one["theta_o"], one["measured"][channel], strict=True) if y is not None]
+    ends = [at(*point).split(",") for point in points[:: 1 + len(points) // DOTS]]
     dots = Markup("").join(Markup('<circle class="dot" cx="{}" cy="{}" r="1.4"/>').format(*end) for end in ends)
     frame = Markup('<rect class="frame" x="{:.1f}" y="{:.1f}" width="{:.0f}" height="{:.0f}"/>').format(
         left, top, *PANEL

@@ -53,6 +53,9 @@ POLICY = (
 )
 """What a browser lets the page do: run the scripts of these hashes, and show pictures that it holds itself."""
 
+TOLD = {"budget", "predictive_check", "learnt", "identifiability", "priors", "metrics"}
+"""Parts of a fit that are told in tables, and that no script asks for."""
+
 DIGITS = 7
 """Significant digits of the record's numbers in a page: more than is shown, fewer than a file keeps."""
 
@@ -80,7 +83,7 @@ def to_html(record: Mapping[str, Any], figures: Mapping[str, Any]) -> str:
             scripts=[Markup(script) for script in scripts],
             styles=[Markup(_static(name)) for name in STYLES],
             licence=Markup(_static(LICENCE)),
-            data=Markup(_embedded({"record": _rounded(told), "figures": drawn})),
+            data=Markup(_embedded({"record": _rounded(_used(told)), "figures": drawn})),
             swatch=figures["swatches"],
             **_WORDS,
         )
@@ -173,6 +176,12 @@ def _embedded(thing: Any) -> str:
     return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
 
 
+def _used(record: Mapping[str, Any]) -> dict[str, Any]:
+    """What scripts may ask of a record; the rest stands in the page's tables and in the file."""
+    fits = [{key: value for key, value in fit.items() if key not in TOLD} for fit in record["fits"]]
+    return {key: value for key, value in record.items() if key != "choice"} | {"fits": fits}
+
+
 def _rounded(thing: Any) -> Any:
     if isinstance(thing, float):
         return float(f"{thing:.{DIGITS}g}")
@@ -194,9 +203,13 @@ def _typeset(text: str) -> Markup:
     return Markup(re.sub(r"\^\(([^)]*)\)", lambda power: f"<sup>{power[1].replace('-', '−')}</sup>", found))
 
 
+_TOGETHER = re.compile(r"(?:(?<=F0)|(?<=α)|(?<=ΔE2000)|(?<=±)) | (?=[%±×])")
+# Spaces between a symbol, its value and its unit.
+
+
 def _held(text: str) -> Markup:
-    """A sentence whose numbers keep to their units where a line ends."""
-    return Markup("{}").format(text.replace(" %", "\u00a0%").replace(" ± ", "\u00a0±\u00a0").replace(" × ", "\u00a0× "))
+    """A sentence whose numbers keep to their symbols and units where a line ends."""
+    return Markup("{}").format(re.sub(_TOGETHER, "\u00a0", text))
 
 
 def _digits(value: float | None, form: str = ".3g") -> str:

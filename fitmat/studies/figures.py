@@ -25,7 +25,7 @@ from fitmat.studies.swatches import spheres, swatch
 CHANNELS, CHANNELS_FULL = 3, 12
 """At most so many channels are drawn, evenly spread; the second where everything was asked."""
 
-MOST_POINTS = 400
+MOST_POINTS = 300
 """Measured points of a curve; of more, so many are drawn, evenly spread."""
 
 MAPS, MAP_POINTS = 8, 700

@@ -241,7 +241,7 @@ def judge(
             whole = usable[0].fit.n_values == usable[0].fit.measurements.n_valid
             choice = choose(usable, predicting=whole, singly=full or len(usable) > 2)
         along = sections(posteriors[0].fit.measurements)
-        looked_at = _detailed(usable, match, choice)
+        looked_at = [p for p in _detailed(usable, match, choice) if p in usable]
         findings, count = [], len(posteriors)
         words = f"examining {', '.join(p.fit.name for p in posteriors) if count <= DETAILED else f'{count} models'}"
         say(words, 0, count)

@@ -19,6 +19,7 @@ from fitmat.models.simulation import simulate
 from fitmat.reports import page, terminal
 from fitmat.studies import findings, record
 from fitmat.studies import study as room
+from fitmat.studies.cards import cards
 from fitmat.studies.result import POSTERIOR, RECORD, load
 from fitmat.studies.sampling import forget
 from fitmat.studies.study import DETAILED, Study, judge, study
@@ -265,3 +266,13 @@ def test_what_a_run_kept_to_go_on_is_removed_and_nothing_else(tmp_path: Path) ->
     forget(tmp_path / "x.resume")
     forget(tmp_path / "x.resume")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.study
+def test_a_pair_under_an_objective_is_matched_and_not_examined(measurements: Measurements) -> None:
+    """It has no posterior of which anything could be determined or replicated."""
+    found = study(measurements, NAMES, loss="log10", sampling=False)
+    assert found.match is not None
+    assert [(one.identifiability, one.check) for one in found.findings] == [(None, None)] * 2
+    told = cards(record.to_dict(found))
+    assert told[2].sentence == "In part: GGX is a single best fit under the loss log10, without intervals."
