@@ -124,7 +124,8 @@ class MetallicRoughness(AbstractLobe):
         p, slopes = self.shape.pair(wi, wo), self.shape.slopes
         mirror = GGX().density(p.h, slopes) * visibility(GGX(), "correlated", slopes, p) / 4.0
         fresnel, metal = self.specular * schlick(p.cos_d, self.f0), schlick(p.cos_d, self.base_color)
-        dielectric = (1.0 - jnp.max(fresnel)) * self.base_color / jnp.pi + fresnel * mirror
+        most = self.specular * schlick(p.cos_d, jnp.max(self.f0))  # of a parameter: rounding cannot hide its channel
+        dielectric = (1.0 - most) * self.base_color / jnp.pi + fresnel * mirror
         mixed = (1.0 - self.metallic) * dielectric + self.metallic * metal * mirror
         return jnp.where(above(wi, wo), mixed, 0.0)
 

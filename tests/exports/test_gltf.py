@@ -7,6 +7,8 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from oracles.gltf_appendix_b import material as appendix_b
@@ -25,9 +27,9 @@ from fitmat.exports.metallic_roughness import (
     template,
 )
 from fitmat.match.carried import carried
-from fitmat.match.imitation import imitate
+from fitmat.match.imitation import imitate, quadrature
 from fitmat.maths.directions import from_angles
-from fitmat.models.base import AbstractBRDF, evaluate
+from fitmat.models.base import AbstractBRDF, evaluate, evaluate_pairs
 from fitmat.models.parameters import vector, with_vector
 from fitmat.models.terms.distributions import Isotropic
 
@@ -81,6 +83,16 @@ def test_the_model_is_appendix_b(coat: Isotropic | None) -> None:
         assert np.abs(found / expected - 1.0).max() < 1e-9
     wrong = told | {"pbrMetallicRoughness": basic | {"roughnessFactor": 0.4**2}}
     assert np.abs(gltf.evaluated(wrong, wi, wo) / expected - 1.0).max() > 0.1
+
+
+def test_slopes_are_finite_where_channels_are_alike() -> None:
+    """The largest of three equal reflectances has one; the search for the closest would stand still without it."""
+    into = template(SATIN, 3)[0]
+    at = quadrature(SATIN, "cube-root")
+    slopes = jax.jit(jax.jacfwd(lambda v: evaluate_pairs(with_vector(into, v), at.wi, at.wo)))(
+        jnp.asarray(vector(into))
+    )
+    assert bool(jnp.isfinite(slopes).all())
 
 
 def test_brushed_materials_are_stretched_along_the_files_tangent() -> None:
