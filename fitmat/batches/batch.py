@@ -19,6 +19,7 @@ from fitmat.batches import rows, workers
 from fitmat.batches.jobs import Job, digest, every_file, from_table
 from fitmat.errors import FitmatError, OutputError
 from fitmat.studies.plan import DEFAULT_MODELS, named, wants_all
+from fitmat.text import visible
 
 TABLE, PARTS = "results.parquet", "parts"
 """What a batch leaves in its folder: the table, and the rows of each file by key."""
@@ -43,7 +44,8 @@ class Batch:
         told = f"{self.counts['fitted']} of {self.counts['fitted'] + self.counts['refused']} files fitted"
         again = f" ({self.counts['earlier']} known from an earlier run)" if self.counts["earlier"] else ""
         lost = self.table.filter(pl.col("outcome").is_in([rows.REFUSED, rows.FAILED]))
-        return "\n".join([f"{told}{again}.", *lost["message"].to_list()])
+        why = lost["file", "message"].iter_rows() if len(lost) else ()
+        return "\n".join([f"{told}{again}.", *(_of_file(*words) for words in why)])
 
 
 def batch(
@@ -125,7 +127,7 @@ def _studied(every: Sequence[Job], target: Path, processes: int, say: Progress) 
     _tell(say, done, len(every))
     for key, found in workers.each(waiting, processes):
         if not any(row["outcome"] == rows.FAILED for row in found):
-            files.write_text(target / PARTS / f"{key}.json", json.dumps(found, ensure_ascii=False))
+            files.write_text(target / PARTS / f"{key}.json", json.dumps(found))
         done |= dict.fromkeys(keys[key], found)
         _tell(say, done, len(every))
     table = _table(every, done)
@@ -135,6 +137,11 @@ def _studied(every: Sequence[Job], target: Path, processes: int, say: Progress) 
     lost = sum(_lost(found) for found in done.values())
     before = sum(len(keys[key]) for key in earlier)
     return Batch(file, table, {"fitted": len(every) - lost, "refused": lost, "earlier": before})
+
+
+def _of_file(file: str, message: str) -> str:
+    name = visible(Path(file).name)
+    return message if visible(message).startswith((name, visible(file))) else f"{name}: {message}"
 
 
 def _lost(found: Sequence[Mapping[str, Any]]) -> bool:
@@ -161,8 +168,13 @@ def _table(every: Sequence[Job], done: Mapping[int, list[dict[str, Any]]]) -> pl
     """One row for each file and model, the columns in the order in which they first appear."""
     flat = [{"file": os.fspath(job.path)} | row for k, job in enumerate(every) for row in done[k]]
     names = list(dict.fromkeys(name for row in flat for name in row))
-    columns = {name: [row.get(name) for row in flat] for name in names}
+    columns = {name: [_storable(row.get(name)) for row in flat] for name in names}
     try:
         return pl.DataFrame({name: pl.Series(name, column, strict=False) for name, column in columns.items()})
     except pl.exceptions.PolarsError as error:
         raise OutputError(f"the rows make no table ({error}); their parts are kept.") from error
+
+
+def _storable(cell: Any) -> Any:
+    """Text as UTF-8 can hold it: a file's name may be of bytes that are no text."""
+    return cell.encode("utf-8", "backslashreplace").decode("utf-8") if isinstance(cell, str) else cell

@@ -119,6 +119,32 @@ def test_a_file_that_changes_while_it_waits_is_said(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.usefixtures("here")
+def test_a_name_that_is_no_text_is_kept_as_text(tmp_path: Path) -> None:
+    """Of bytes that are no UTF-8, as a disk of another system has them; the file is used, or refused by that name."""
+    for name, text in ((b"good\xff.csv", (DATA / "wax.csv").read_bytes()), (b"bad\xff.csv", b"theta_i,theta_o,brdf\n")):
+        (tmp_path / os.fsdecode(name)).write_bytes(text)
+    for earlier in (0, 2):
+        found = fm.batch(tmp_path / "*.csv", tmp_path / "out", "lambert")
+        assert found.counts["earlier"] == earlier
+        assert [Path(file).name for file in found.table["file"]] == ["bad\\udcff.csv", "good\\udcff.csv"]
+        assert pl.read_parquet(found.file).equals(found.table)
+        assert str(found).split("\n")[1].startswith("bad\\udcff.csv: a header and no rows")
+
+
+@pytest.mark.usefixtures("here")
+def test_what_is_wrong_with_a_job_names_its_file(tmp_path: Path) -> None:
+    shutil.copy(DATA / "wax.csv", tmp_path)
+    (tmp_path / "jobs.csv").write_text("file,models,seed\nwax.csv,lambort,\nwax.csv,lambert,-1\n", encoding="utf-8")
+    (tmp_path / "new\nline.csv").touch()
+    found = fm.batch([tmp_path / "new\nline.csv"], tmp_path / "out", jobs=tmp_path / "jobs.csv")
+    assert [words[:30] for words in str(found).split("\n")[1:]] == [
+        "new\\nline.csv: the file is emp",
+        "wax.csv: model 'lambort': no l",
+        "wax.csv: seed is -1, expected ",
+    ]
+
+
 def test_a_fault_of_ours_is_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(workers, "study", lambda *_, **__: 1 / 0)
     (row,) = studied(Job(DATA / "wax.csv", {}, TOLD), digest(DATA / "wax.csv"))
