@@ -6,7 +6,7 @@ another room could.
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from markupsafe import Markup
 
@@ -32,7 +32,7 @@ def curves(figures: Record) -> Markup:
     if not drawn:
         return Markup("")
     rows = -(-len(drawn) // COLUMNS)
-    width, height = COLUMNS * (PANEL[0] + GAP), rows * (PANEL[1] + GAP + 14)
+    width, height = COLUMNS * (PANEL[0] + GAP) + 2, rows * (PANEL[1] + GAP + 14)
     parts = [_panel(one, figures["models"], channel, k) for k, one in enumerate(drawn)]
     what = f"Measured points with the curves of {' and '.join(figures['models'])}, one panel for each incidence"
     body = Markup("").join(parts)
@@ -41,38 +41,68 @@ def curves(figures: Record) -> Markup:
     )
 
 
+class _Frame(NamedTuple):
+    """Where a panel lies, and what its vertical axis holds."""
+
+    left: float
+    top: float
+    low: float
+    high: float
+    log: bool
+
+    def at(self, x: float, y: float) -> str:
+        """The place of a value at an angle; what lies beyond the axis at its edge."""
+        low, high = self.low, self.high
+        share = math.log(max(y, low) / low) / math.log(high / low) if self.log else (y - low) / (high - low)
+        up = 1.0 - min(max(share, -0.02), 1.02)
+        return f"{self.left + (x + 90.0) / 180.0 * PANEL[0]:.1f},{self.top + up * PANEL[1]:.1f}"
+
+    def words(self, title: str) -> Markup:
+        """The frame, its title, and the ends of its axes."""
+        text = Markup('<text class="{}" text-anchor="{}" x="{:.1f}" y="{:.1f}">{}</text>')
+        bottom = self.top + PANEL[1]
+        return Markup("").join(
+            [
+                Markup('<rect class="frame" x="{:.1f}" y="{:.1f}" width="{:.0f}" height="{:.0f}"/>').format(
+                    self.left, self.top, *PANEL
+                ),
+                text.format("", "start", self.left, self.top - 4, title),
+                text.format("faint", "start", self.left, bottom + 12, "BRDF / sr⁻¹ over θₒ from −90° to 90°"),
+                text.format("faint", "end", self.left - 3, self.top + 8, f"{self.high:.2g}"),
+                text.format("faint", "end", self.left - 3, bottom, f"{self.low:.2g}"),
+            ]
+        )
+
+
 def _panel(one: Record, models: Sequence[str], channel: int, k: int) -> Markup:
-    left, top = (k % COLUMNS) * (PANEL[0] + GAP) + GAP, (k // COLUMNS) * (PANEL[1] + GAP + 14) + 16
+    fits = [one["models"][name] for name in models]
     measured = [y for y in one["measured"][channel] if y is not None]
     positive = [y for y in measured if y > 0]
     log = bool(positive) and math.log10(max(positive) / min(positive)) > DECADES
-    fits = [one["models"][name] for name in models]
     highest = max([*measured, 1e-6])
     peak = max([y for fit in fits for y in fit["value"][channel] if y is not None] + [highest])
-    high = min(peak, ABOVE * highest) * (2.0 if log else 1.1)
-    low = min(positive) / 3.0 if log else min(0.0, *measured, 0.0)
-
-    def at(x: float, y: float) -> str:
-        share = math.log(max(y, low) / low) / math.log(high / low) if log else (y - low) / (high - low)
-        share = min(max(share, -0.02), 1.02)
-        return f"{left + (x + 90.0) / 180.0 * PANEL[0]:.1f},{top + (1.0 - share) * PANEL[1]:.1f}"
-
+    frame = _Frame(
+        left=(k % COLUMNS) * (PANEL[0] + GAP) + GAP,
+        top=(k // COLUMNS) * (PANEL[1] + GAP + 14) + 16,
+        low=min(positive) / 3.0 if log else min(0.0, *measured, 0.0),
+        high=min(peak, ABOVE * highest) * (2.0 if log else 1.1),
+        log=log,
+    )
     lines = [
         Markup('<polyline class="line model{}" points="{}"/>').format(
-            n, " ".join(at(x, y) for x, y in zip(fit["theta_o"], fit["value"][channel], strict=True) if y is not None)
+            n, " ".join(frame.at(*point) for point in _known(fit["theta_o"], fit["value"][channel]))
         )
         for n, fit in enumerate(fits)
     ]
-    points = [(x, y) for x, y in zip(one["theta_o"], one["measured"][channel], strict=True) if y is not None]
-    ends = [at(*point).split(",") for point in points[:: 1 + len(points) // DOTS]]
-    dots = Markup("").join(Markup('<circle class="dot" cx="{}" cy="{}" r="1.4"/>').format(*end) for end in ends)
-    frame = Markup('<rect class="frame" x="{:.1f}" y="{:.1f}" width="{:.0f}" height="{:.0f}"/>').format(
-        left, top, *PANEL
-    )
-    said = f"incidence {one['theta_i']:g}°{' (log)' if log else ''}, up to {highest:.3g} sr⁻¹"
-    text = Markup('<text x="{:.1f}" y="{:.1f}">{}</text>').format(left, top - 4, said)
-    axis = Markup('<text class="faint" x="{:.1f}" y="{:.1f}">θₒ −90° … 90°</text>').format(left, top + PANEL[1] + 12)
-    return Markup("").join([frame, text, axis, *lines, dots])
+    points = _known(one["theta_o"], one["measured"][channel])
+    ends = [frame.at(*point).split(",") for point in points[:: 1 + len(points) // DOTS]]
+    dots = [Markup('<circle class="dot" cx="{}" cy="{}" r="1.4"/>').format(*end) for end in ends]
+    title = f"incidence {one['theta_i']:g}°{', logarithmic' if log else ''}"
+    return Markup("").join([frame.words(title), *lines, *dots])
+
+
+def _known(x: Sequence[float], y: Sequence[float | None]) -> list[tuple[float, float]]:
+    return [(a, b) for a, b in zip(x, y, strict=True) if b is not None]
 
 
 def interval_bar(

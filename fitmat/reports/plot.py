@@ -3,16 +3,12 @@
 Computes nothing that another room could; the only importer of matplotlib.
 """
 
-import itertools
-from collections.abc import Sequence
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fitmat import arguments
 from fitmat.errors import FitmatError
-from fitmat.judgement.choice import SMALL, Choice
 from fitmat.match.ablation import Ablation
 from fitmat.match.appearance.spheres import Perceived
 from fitmat.match.discernibility import SEPARATED, Telling
@@ -96,16 +92,6 @@ def _set_scale(ax: Axes, measured: np.ndarray, top: float) -> None:
         ax.set_ylim(positive.min() / 3, highest * 2)
     else:
         ax.set_ylim(min(0.0, 1.2 * measured.min(initial=0.0)), 1.15 * highest)
-
-
-def residual_figure(study: Study, channels: Sequence[int] = (0,)) -> Figure:
-    """Standardised residuals, one row for each channel, one column for each model."""
-    arguments.kind("study", study, Study)
-    columns = len(study.findings)
-    figure = Figure(figsize=(5.0 * columns, 3.0 * len(channels)), layout="constrained")
-    for k, (channel, found) in enumerate(itertools.product(channels, study.findings)):
-        residuals(found, channel=channel, ax=figure.add_subplot(len(channels), columns, k + 1))
-    return figure
 
 
 def residuals(found: Findings, *, channel: int = 0, ax: Axes | None = None) -> Axes:
@@ -193,43 +179,6 @@ def telling(telling: Telling, ax: Axes | None = None) -> Axes:
 
 def _against_incidence(ax: Axes, label: str) -> Axes:
     ax.set(xlim=(0, 90), xlabel="incidence θᵢ / °", ylabel=label)
-    ax.legend(fontsize=8)
-    return ax
-
-
-def choice(choice: Choice, ax: Axes | None = None) -> Axes:
-    """How far each model is behind the best in elpd, with standard errors; grey: too close to call."""
-    arguments.kind("choice", choice, Choice)
-    candidates = choice.candidates
-    ax = ax or new_axes(6.4, 0.9 + 0.3 * len(candidates))
-    for k, c in enumerate(candidates):
-        colour = ORANGE if c.clearly_behind else BLUE
-        hollow = "none" if c.broken else colour
-        ax.errorbar(-c.behind, k, xerr=2 * c.behind_se, fmt="o", color=colour, mfc=hollow, ms=5, lw=1.3, capsize=2)
-    farthest = max((c.behind + 2 * c.behind_se for c in candidates), default=0.0)
-    ax.axvspan(-SMALL, SMALL, color="0.9", zorder=0)
-    if farthest > 20 * SMALL:
-        ax.set_xscale("symlog", linthresh=4 * SMALL)
-    ax.axvline(0.0, color="0.5", lw=0.8, ls="--", zorder=0)
-    ax.set_yticks(range(len(candidates)), [c.name for c in candidates], fontsize=8)
-    ax.set_ylim(len(candidates) - 0.4, -0.6)
-    ax.set_xlabel("elpd to the best, ± 2 standard errors (hollow: breaks a law of reflection)", fontsize=8)
-    ax.tick_params(axis="x", labelsize=7)
-    return ax
-
-
-def left_out(choice: Choice, *, most: int = 4, ax: Axes | None = None) -> Axes:
-    """Prediction errors of incidences that were left out, for the `most` best models that were refitted."""
-    arguments.kind("choice", choice, Choice)
-    ax = ax or new_axes()
-    shown = sorted([c for c in choice.candidates if c.left_out is not None][:most], key=lambda c: c.name)
-    for c, colour, marker in zip(shown, FIT_COLOURS, "os^D", strict=False):
-        assert c.left_out is not None
-        ax.plot(c.left_out.theta_i_deg, c.left_out.cube_root, marker, ls="-", color=colour, ms=4, lw=1, label=c.name)
-    ax.set(xlim=(0, 90), ylim=(0, None))
-    ax.set_xlabel("incidence left out, θᵢ / °", fontsize=8)
-    ax.set_ylabel("rms error of ∛(f cosθᵢ) / sr$^{-1/3}$", fontsize=8)
-    ax.tick_params(labelsize=7)
     ax.legend(fontsize=8)
     return ax
 

@@ -4,6 +4,7 @@
 "use strict";
 const fitmat = (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
+  document.documentElement.classList.add("drawn");  // what stands in for charts makes way, before any is measured
   const redraws = [];
   const state = {channel: Math.floor(data.figures.channels.length / 2), scale: null, shared: true, bands: true,
                  models: new Set(data.figures.models), incidences: null, zoom: null, map: "measured"};
@@ -42,6 +43,10 @@ const fitmat = (() => {
   let width = document.documentElement.clientWidth, waiting = 0;
   const again = () => { for (const callback of redraws) callback(); };
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
+  for (const [event, onPaper] of [["beforeprint", true], ["afterprint", false]]) addEventListener(event, () => {
+    document.documentElement.classList.toggle("paper", onPaper);
+    again();
+  });
   addEventListener("resize", () => {
     if (document.documentElement.clientWidth === width) return;
     width = document.documentElement.clientWidth;

@@ -9,7 +9,6 @@ fitmat.part("panels", (place, {figures}) => {
   let drawn = [];
 
   controls(document.getElementById("curve-controls"));
-  document.getElementById("curves").classList.add("drawn");
   draw();
   fitmat.redraw(draw);
   addEventListener("fitmat-state", draw);

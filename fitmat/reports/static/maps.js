@@ -5,7 +5,6 @@ fitmat.part("maps", (place, {figures}) => {
   const CIVIDIS = [[0, 34, 78], [18, 53, 112], [59, 73, 108], [87, 93, 109], [112, 113, 115], [138, 134, 120], [165, 156, 116], [195, 179, 105], [225, 204, 85], [254, 232, 56]];
   const DIVIDING = [[0, 90, 160], [86, 180, 233], [235, 235, 235], [240, 160, 100], [190, 70, 0]];
   controls(document.getElementById("curve-controls"));
-  document.getElementById("curves").classList.add("drawn");
   draw();
   fitmat.redraw(draw);
   addEventListener("fitmat-state", draw);
