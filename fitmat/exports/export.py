@@ -160,7 +160,7 @@ def _made(chosen: Chosen, target: str, name: str, grid: Mapping[str, Any], *, st
     form = made.translate(chosen, **grid)
     notes = tuple(made.notes(chosen, form))
     if strict and notes:
-        raise ModelError(f"{notes[0]} Leave out strict to export it all the same.")
+        raise ModelError(f"{' '.join(notes)} Leave out strict to export it all the same.")
     found = made.difference(chosen, form) if verify else None
     called = file_name(Path(name).stem if name == chosen.source else name)
     header = [*_header(chosen, made, name), *notes, *_executed(found).split("\n")]

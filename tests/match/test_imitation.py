@@ -44,8 +44,11 @@ def test_a_model_imitates_itself_exactly(metric: str) -> None:
     )
 
 
-@pytest.mark.parametrize("metric", ["relative", "cube-root", "log-ratio"])
-def test_the_closest_blinn_phong_is_that_of_scipy(metric: str) -> None:
+@pytest.mark.parametrize(
+    ("metric", "weighted"),
+    [("relative", None), ("cube-root", None), ("log-ratio", None), ("cube-root", "projected")],
+)
+def test_the_closest_blinn_phong_is_that_of_scipy(metric: str, weighted: Any) -> None:
     """GGX and Blinn–Phong in numpy on a grid in the three angles; three parameters by SciPy's own solver."""
     count = 45
     theta, phi = (np.arange(count) + 0.5) * np.pi / 2 / count, (np.arange(60) + 0.5) * np.pi / 60
@@ -59,7 +62,7 @@ def test_the_closest_blinn_phong_is_that_of_scipy(metric: str) -> None:
         kappa = np.maximum(ci * co, 1e-3)
         return {"relative": f, "cube-root": np.cbrt(f * ci), "log-ratio": np.log(f * kappa + 1e-3)}[metric]
 
-    weight = solid * ci * co if metric == "relative" else solid
+    weight = solid * ci * co if metric == "relative" or weighted == "projected" else solid
     norm = weight @ target**2 if metric == "relative" else weight.sum()
 
     def residual(p: np.ndarray) -> np.ndarray:
@@ -67,7 +70,7 @@ def test_the_closest_blinn_phong_is_that_of_scipy(metric: str) -> None:
         return np.sqrt(weight / norm) * (seen(kd / np.pi + ks * (n + 8) / (8 * np.pi) * c_h**n) - seen(target))
 
     theirs = least_squares(residual, [0.3, 0.1, np.log(10.0)], bounds=([0, 0, -2], [1, 10, 12]), x_scale="jac")
-    ours = imitate(fm.model("lambert+ggx", **METAL), "lambert+blinn-phong", metric)
+    ours = imitate(fm.model("lambert+ggx", **METAL), "lambert+blinn-phong", metric, weight=weighted)
     kd, ks, n = (ours.parameters[name][0] for name in ("kd", "ks", "exponent"))
     assert [kd, ks, n] == pytest.approx([*theirs.x[:2], np.exp(theirs.x[2])], rel=GRID)
     assert ours.distance == pytest.approx(np.sqrt(2 * theirs.cost), rel=GRID)
