@@ -83,35 +83,44 @@ vec3 around(vec3 axis, float cosine, float turned) {
     return sine * (cos(turned) * t + sin(turned) * cross(axis, t)) + cosine * axis;
 }
 
-// Density of the four ways in which directions are chosen, per steradian: by the cosine, by the slope of the half
-// vector, evenly in its logarithm from 1e-4 to 3, which suits a lobe of any width, and about each window.
-float density(vec3 w, vec3 wi, vec3 wo) {
+// Per steradian, how densely each of four ways chooses a direction, times its share of all: by the cosine, a quarter;
+// by the slope of the half vector, evenly in its logarithm from 3e-4 to 3, which suits a lobe of any width, a half; and
+// about each window, an eighth.
+vec4 densities(vec3 w, vec3 wi, vec3 wo) {
     vec3 h = normalize(wi + wo);
-    float slope2 = dot(h.xy, h.xy) / (h.z * h.z), found = max(wi.z, 0.0);
-    if (slope2 > 0.99e-8 && slope2 < 9.0) {
-        found += pow(1.0 + slope2, 1.5) / (2.0 * 10.309 * slope2) / (4.0 * max(dot(wo, h), 1e-6));
+    float slope2 = dot(h.xy, h.xy) / (h.z * h.z);
+    vec4 found = vec4(0.25 * max(wi.z, 0.0), 0.0, 0.0, 0.0);
+    if (slope2 > 8.9e-8 && slope2 < 9.0) {
+        found.y = 0.5 * pow(1.0 + slope2, 1.5) / (2.0 * 9.21034 * slope2) / (4.0 * max(dot(wo, h), 1e-6));
     }
-    for (int k = 0; k < 2; ++k) found += 0.5 * sharpness[k] * exp(sharpness[k] * (dot(w, windows[k]) - 1.0));
-    return found / (4.0 * 3.14159265);
+    for (int k = 0; k < 2; ++k) {
+        found[2 + k] = 0.125 * 0.5 * sharpness[k] * exp(sharpness[k] * (dot(w, windows[k]) - 1.0));
+    }
+    return found / 3.14159265;
 }
 
-// The environment's light that leaves towards wo, from evenly spread directions, the same for every pixel.
+// The environment's light that leaves towards wo, from evenly spread directions, the same for every pixel; what several
+// ways could have chosen is shared among them by the squares of their densities (Veach 1997, sec. 9.2).
 vec3 surrounded(mat3 surface, vec3 wo) {
     vec3 total = vec3(0.0);
     for (int k = 0; k < 4 * rounds; ++k) {
-        vec2 u = fract(0.5 + vec2(0.7548776662, 0.5698402910) * float(k / 4 + 1));
+        int turn = k % 4, way = turn == 0 ? 0 : turn < 3 ? 1 : 2 + (k / 4) % 2;
+        vec2 u = fract(0.5 + vec2(0.7548776662, 0.5698402910) * float(way == 1 ? k / 2 + 1 : k / 4 + 1));
         float turned = 6.28318531 * u.y;
-        int way = k % 4;
         vec3 wi;
         if (way == 0) wi = around(vec3(0, 0, 1), sqrt(u.x), turned);
         if (way == 1) {
-            vec3 h = normalize(vec3(1e-4 * exp(10.309 * u.x) * vec2(cos(turned), sin(turned)), 1.0));
+            vec3 h = normalize(vec3(3e-4 * exp(9.21034 * u.x) * vec2(cos(turned), sin(turned)), 1.0));
             wi = 2.0 * dot(wo, h) * h - wo;
         }
-        if (way > 1) wi = surface * around(windows[way - 2], 1.0 + log(mix(exp(-2.0 * sharpness[way - 2]), 1.0, u.x)) / sharpness[way - 2], turned);
+        if (way > 1) {
+            float k = sharpness[way - 2];
+            wi = surface * around(windows[way - 2], 1.0 + log(mix(exp(-2.0 * k), 1.0, u.x)) / k, turned);
+        }
         if (wi.z <= 0.0) continue;
         vec3 w = wi * surface;
-        total += brdf(wi, wo) * environment(w) * wi.z / density(w, wi, wo);
+        vec4 each = densities(w, wi, wo);
+        total += brdf(wi, wo) * environment(w) * wi.z * each[way] / dot(each, each);
     }
     return total / float(4 * rounds);
 }
