@@ -6,7 +6,7 @@ It writes nothing itself.
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from fitmat.exports import gltf, materialx, materialx_shader, mitsuba, shaders, table, translation, verification
+from fitmat.exports import gltf, materialx, materialx_shader, mitsuba, shaders, table, translation, verification, zemax
 from fitmat.exports.material import Chosen
 from fitmat.exports.verification import Difference
 
@@ -75,6 +75,7 @@ TARGETS = {
         materialx.facts,
     ),
     "table": Target("a table of angles", table.measured, table.texts, table.difference, gridded=True),
+    "zemax": Target("Zemax's tabulated BSDF", zemax.translated, zemax.texts, zemax.difference, gridded=True),
     "merl": Target("a MERL file", table.in_cells, table.file, table.looked_up, table.notes),
 }
 """Targets by name."""

@@ -87,6 +87,7 @@ def test_what_could_mean_two_things_is_refused(name: str, given: dict[str, Any],
             fm.model(name, **given)
 
 
+@pytest.mark.study
 def test_a_fit_holds_what_is_read_so() -> None:
     angles = np.linspace(-1.2, 1.2, 25)
     measured = fm.simulate(

@@ -13,7 +13,9 @@ ResultFlag = Annotated[Path, typer.Argument(help="Folder of a run of fitmat fit,
 TargetFlag = Annotated[
     str,
     typer.Option(
-        "--to", help="What it is written for: glsl, mitsuba, materialx, openpbr, gltf, table, merl.", metavar="TARGET"
+        "--to",
+        help="What it is written for: glsl, mitsuba, materialx, openpbr, gltf, zemax, table, merl.",
+        metavar="TARGET",
     ),
 ]
 
@@ -21,7 +23,7 @@ TableThetaIFlag = Annotated[
     str | None,
     typer.Option(
         "--theta-i",
-        help="Incidences of a table in degrees, 10,30,60 or FIRST:LAST:STEP; default those of reflection.",
+        help="Incidences of a table or Zemax file in degrees, 10,30,60 or FIRST:LAST:STEP; default as reflection.",
         show_default=False,
     ),
 ]
@@ -30,7 +32,7 @@ StepFlag = Annotated[
     float | None,
     typer.Option(
         "--step",
-        help="Degrees between a table's angles of reflection, and its azimuths; default 5, 15 if anisotropic.",
+        help="Degrees between such a table's angles of reflection, and its azimuths; default 5, 15 if anisotropic.",
         show_default=False,
     ),
 ]
