@@ -461,6 +461,8 @@ def test_one_bad_channel_masks_one_value():
         ([1.0, -1.0, -1.0], {"sentinel -1": 2}, False),
         ([1.0, -0.01, -0.02], {}, "Negative values kept as noise: 2."),
         ([1.0, 2.0, -999.0], {"sentinel -999": 1}, False),
+        ([0.1, 65535.0, 65535.0], {"sentinel 65535": 2}, False),
+        ([65535.0, 32767.0, 32767.0], {}, False),
         ([1.0, -0.01, -999.0], {"sentinel -999": 1}, "Negative values kept as noise: 1."),
         ([-9999.0, 1.0, 9.96921e36], {"sentinel -9999": 1, "sentinel 9.96921e+36": 1}, False),
         ([1.0, 2.0, -998.0], {}, "Negative values kept as noise: 1."),

@@ -23,7 +23,7 @@ _FILLS = (1e20, 1e30, 1e34, 1e36, 1e38, 9.96921e36, 9.969209968386869e36, 3.4028
 SENTINELS = (-99.0, -999.0, -9999.0, -99999.0, -999999.0, -32768.0, *_FILLS, *(-fill for fill in _FILLS))
 """Numbers that programs write for "no datum"; no surface and no detector has them."""
 
-NINES = (999.0, 9999.0, 99999.0, 999999.0)
+LARGEST = (999.0, 9999.0, 99999.0, 999999.0, 32767.0, 65535.0)
 """Numbers that stand for nothing where they are repeated and every other is `ALONE` times smaller."""
 
 ALONE = 10.0
@@ -128,12 +128,12 @@ def named(sentinel: float) -> str:
     return f"sentinel {sentinel:g}"
 
 
-def _nines(value: Float[np.ndarray, "n c"]) -> float | None:
-    """The largest value, where it is one of `NINES`, repeated, and no other comes near it."""
+def _repeated(value: Float[np.ndarray, "n c"]) -> float | None:
+    """The largest value, where it is one of `LARGEST`, repeated, and no other comes near it."""
     known = value[np.isfinite(value) & ~is_sentinel(value)]
     largest = known.max(initial=0.0)
     others = known[known < largest]
-    if largest not in NINES or len(known) - len(others) < 2 or ALONE * others.max(initial=0.0) > largest:
+    if largest not in LARGEST or len(known) - len(others) < 2 or ALONE * others.max(initial=0.0) > largest:
         return None
     return float(largest)
 
@@ -154,8 +154,8 @@ def mask(recording: Recording) -> tuple[Bool[np.ndarray, "n c"], dict[str, int]]
     negative = value[(value < 0) & ~is_sentinel(value)]
     if len(negative) > 1 and (negative == negative[0]).all():
         reasons[named(negative[0])] = value == negative[0]
-    if (nines := _nines(value)) is not None:
-        reasons[named(nines)] = value == nines
+    if (found := _repeated(value)) is not None:
+        reasons[named(found)] = value == found
     valid = np.ones(value.shape, bool)
     masked = {}
     for reason, bad in reasons.items():
