@@ -7,6 +7,7 @@ luminance of the microfacet model's best fit `MIDDLE_GREY`, for each light anew:
 the same camera.
 """
 
+import bisect
 import dataclasses
 
 import numpy as np
@@ -35,6 +36,9 @@ Mokrzycki & Tatol 2011 (Machine Graphics & Vision 20(4)): below 1 not noticed, f
 Paravina et al. 2015 (J. Esthet. Restor. Dent. 27): half of the observers see 0.8 and reject 1.8. ΔE_ITP is scaled so
 that 1 is just noticeable (ITU-R BT.2124).
 """
+
+SEES = ("see no difference", "hardly see a difference", "clearly see a difference")
+"""What is said below, between and above these."""
 
 SIZE = 72
 """Pictures are so many pixels wide."""
@@ -118,14 +122,10 @@ class Perceived:
         """One sentence; the thresholds are `JUST_NOTICEABLE` and `CLEARLY_VISIBLE`, for the worst twentieth."""
         by_light = sorted(self.lightings, key=lambda lighting: lighting.delta_e_2000.worst_twentieth.value)
         every, least, most = self.delta_e_2000, by_light[0], by_light[-1]
-        limit = every.worst_twentieth.ci95[1]
-        sees = (
-            "see no difference"
-            if limit < JUST_NOTICEABLE
-            else "hardly see a difference"
-            if limit < CLEARLY_VISIBLE
-            else "clearly see a difference"
-        )
+        worst = every.worst_twentieth
+        least_seen, limit = worst.ci95 if worst.has_interval else (worst.value, worst.value)
+        low, high = (bisect.bisect_right((JUST_NOTICEABLE, CLEARLY_VISIBLE), end) for end in (least_seen, limit))
+        sees = SEES[low] if low == high else f"{SEES[low]} or {SEES[high]}, which the data leave open"
         where = f", most under the {most.name}, least under the {least.name}" if limit >= JUST_NOTICEABLE else ""
         numbers = f"ΔE2000 {every.mean.value:.1f} on average, {every.worst_twentieth.value:.1f} in the worst twentieth"
         return f"On a lit sphere an eye would {sees}{where} ({numbers})."
