@@ -216,6 +216,9 @@ def _read(file: Path) -> dict[str, Any]:
     except OSError as error:
         raise ReadError(f"{file}: {error.strerror or error}; expected the folder of a run, with {RECORD}.") from error
     except (ValueError, RecursionError) as error:
+        if file.name != RECORD:
+            expected = "expected the folder that `fitmat fit` wrote. If it holds measurements, fit them first."
+            raise ReadError(f"{file} is no record of a run, {expected}") from error
         raise ReadError(f"{file} is damaged ({_first_line(error)}), expected the JSON of a run. Fit again.") from error
     if not isinstance(found, dict) or not {"fitmat", "fits"} <= found.keys():
         raise ReadError(f"{file} is no record of a run, expected what `fitmat fit` writes as {RECORD}.")

@@ -114,6 +114,13 @@ def test_every_model_is_built_again(tmp_path: Path, chosen: str | None) -> None:
     assert built > (70 if chosen is None else 40)
 
 
+def test_a_file_of_measurements_is_to_be_fitted_first(tmp_path: Path) -> None:
+    for content in (b"theta_i,theta_o,brdf\n10,20,0.1\n", b"\x89PNG\xff"):
+        (tmp_path / "scan.csv").write_bytes(content)
+        with pytest.raises(ReadError, match=r"scan\.csv is no record of a run, expected the folder that `fitmat fit`"):
+            load(tmp_path / "scan.csv")
+
+
 DAMAGES: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "older": (lambda r: r.pop("format"), r"of no format, by fitmat 0\.1\.0, expected format 1\. Fit again"),
     "later": (lambda r: r.update(format=2), "is of format 2, by fitmat"),
