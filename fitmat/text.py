@@ -43,6 +43,15 @@ def visible(text: str, keep: str = "") -> str:
     return text.translate({ord(c): "\\u007f" if c == "\x7f" else json.dumps(c)[1:-1] for c in odd})
 
 
+def visible_in(thing: Any, *, keep: str = "") -> Any:
+    """JSON types with `visible` texts, names of their parts included."""
+    if isinstance(thing, str):
+        return visible(thing, keep=keep)
+    if isinstance(thing, Mapping):
+        return {visible(str(key)): visible_in(value, keep=keep) for key, value in thing.items()}
+    return [visible_in(part, keep=keep) for part in thing] if isinstance(thing, list | tuple) else thing
+
+
 def for_shell(path: str | os.PathLike[str]) -> str:
     """A path as a command line takes it, quoted where it must be."""
     return visible(shlex.quote(os.fspath(path)))

@@ -28,7 +28,7 @@ from fitmat.reports import ball, drawings
 from fitmat.reports.rows import brief_rows, parameter_rows, prior_rows
 from fitmat.reports.snippets import snippets
 from fitmat.studies.cards import best, cards, ordered, title
-from fitmat.text import visible
+from fitmat.text import visible_in
 from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAIL_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS
 
 SCRIPTS = (
@@ -67,7 +67,7 @@ def to_html(record: Mapping[str, Any], figures: Mapping[str, Any]) -> str:
         record: JSON types, as `studies.record.to_dict` makes them.
         figures: The same, of `studies.figures.to_dict`, with the ball's data.
     """
-    told, drawn = _shown(record), _shown(figures)
+    told, drawn = visible_in(record, keep="\n"), visible_in(figures, keep="\n")
     scripts = [*map(_static, SCRIPTS), _stage()]
     hashes = " ".join(f"'sha256-{_digest(script)}'" for script in scripts)
     return (
@@ -161,15 +161,6 @@ def _digest(script: str) -> str:
     return base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
 
-def _shown(thing: Any) -> Any:
-    """JSON types with every text as a page shows it, without marks that would turn or hide what follows."""
-    if isinstance(thing, str):
-        return visible(thing, keep="\n")
-    if isinstance(thing, Mapping):
-        return {visible(str(key)): _shown(value) for key, value in thing.items()}
-    return [_shown(part) for part in thing] if isinstance(thing, list | tuple) else thing
-
-
 def _embedded(thing: Any) -> str:
     """JSON that ends no script and begins no tag."""
     text = json.dumps(thing, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
@@ -209,7 +200,7 @@ _TOGETHER = re.compile(r"(?:(?<=F0)|(?<=α)|(?<=ΔE2000)|(?<=±)) | (?=[%±×])"
 
 def _held(text: str) -> Markup:
     """A sentence whose numbers keep to their symbols and units where a line ends."""
-    return Markup("{}").format(re.sub(_TOGETHER, "\u00a0", text))
+    return Markup(re.sub(_TOGETHER, "&nbsp;", str(Markup.escape(text))))
 
 
 def _digits(value: float | None, form: str = ".3g") -> str:

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from fitmat.reports.rows import parameter_rows
 from fitmat.studies.cards import BAD, CAUTION, GOOD, UNKNOWN, cards, ordered
-from fitmat.text import visible
+from fitmat.text import visible, visible_in
 
 Record = Mapping[str, Any]
 """JSON types of `studies.record.to_dict`, or a part of it."""
@@ -33,7 +33,7 @@ def show(record: Record, report: Path, screen: Console | None = None) -> None:
         report: The page, or the record where there is no page.
         screen: Where to; stdout if None.
     """
-    out = screen or Console()
+    out, record = screen or Console(), visible_in(record)
     channels = f", channels {', '.join(record['channels'])}" if len(record["channels"]) > 1 else ""
     _say(out, f"{record['file']}: {record['n_samples']} samples{channels}\n")
     for card in cards(record):
