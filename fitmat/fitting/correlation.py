@@ -4,15 +4,12 @@ A likelihood that counts the misfit of each sample as independent gets narrower 
 misfits of neighbours are. Here the residuals of a finished fit are taken as noise plus smooth processes over the
 geometry, η² I + Σ τ² K: one within `NEAR` widths of the lobe, one beyond, for a misfit of the highlight says nothing of
 the base. All sizes are found by restricted maximum likelihood, which allows for the parameters that were fitted
-(Patterson & Thompson, Biometrika 58, 1971), each channel by itself; how well τ is known is allowed for by Student's t.
-The covariance of the parameters becomes
-
-    V = H⁻¹ Jᵀ(η² I + Σ τ² n/m I) J H⁻¹,
-
-Huber's sandwich (1967) with a meat that is modelled: the n readings of a part count as the m = (tr K)²/tr K² that are
-independent (`process.meat`). It is never narrower than H⁻¹ in any direction. Draws θ become θ̂ + A(θ − θ̂) with
-A H⁻¹ Aᵀ = V (Shaby, "The open-faced sandwich adjustment for MCMC using estimating functions", J. Comp. Graph. Stat. 23,
-2014), so that whatever follows from draws follows from these. The best fit stays.
+(Patterson & Thompson, Biometrika 58, 1971), each channel by itself. Where there is a process, the covariance V of the
+parameters is that of the jackknife which leaves out ranges of the difference angle θ_d, and of the incidence, in turn
+(`left_blocks`), the mean of the two: how much a range more or less would move them is seen, not modelled. It is never
+narrower than H⁻¹ in any direction. Channels without a process add what their likelihood says. Draws θ become
+θ̂ + A(θ − θ̂) with A H⁻¹ Aᵀ = V (Shaby, "The open-faced sandwich adjustment for MCMC using estimating functions",
+J. Comp. Graph. Stat. 23, 2014), so that whatever follows from draws follows from these. The best fit stays.
 
 K is Matérn's of smoothness 3/2 over where the half vector lies about the normal, at distance asinh(θ_h/w) with the
 lobe's width w (an even scale up to one width, ratios beyond) and at its azimuth from the plane of incidence, and over
@@ -20,14 +17,16 @@ the difference angle θ_d. Its lengths are fixed: free ones follow chance. It kn
 """
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from fitmat.fitting.coordinates import Coordinates
+from fitmat.fitting.left_blocks import left_out, ranges
 from fitmat.fitting.likelihood import Data
 from fitmat.fitting.linear import Linear
-from fitmat.fitting.process import ASKED, counted, find, independent, kernel, meat
+from fitmat.fitting.process import ASKED, Found, counted, find, independent, kernel
 from fitmat.maths.directions import zenith
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector
@@ -119,8 +118,9 @@ def correlate(
     some = np.any(used, axis=1)
     parts = kernel(places, np.stack([some & near, some & ~near]))
     found, counts = find(r, slopes, used, parts), counted(used, parts)
-    asked, half = found.gain >= ASKED, np.linalg.solve(h, meat(found, slopes, counts, parts.rows, linear.more))
-    ratio, axes = np.linalg.eigh(np.linalg.solve(h, half.T))
+    asked = found.gain >= ASKED
+    along = places[:, 2], np.round(np.asarray(zenith(np.asarray(linear.data.wi)[first])), 6)
+    ratio, axes = np.linalg.eigh(h.T @ _spread(found, r, slopes, along, linear) @ h)
     least = 1.0 + 2.0 * rho / (1.0 - rho) / (1.0 + s / float(data.typical)) ** 2
     if least == 1.0 and (not asked.any() or ratio[-1] <= 1.0):
         judged = np.isfinite(found.gain).any()
@@ -131,6 +131,26 @@ def correlate(
     inflation[inside] = np.sum(wide**2, axis=1) / np.sum(np.linalg.inv(h) ** 2, axis=0)
     share, alone = float(np.mean(near[some])), min(independent(found, counts, linear.more), count / least)
     return Correlation(found.size, share, found.gain, stretch, inflation, alone, "correlated", least)
+
+
+def _spread(
+    found: Found,
+    r: Float[np.ndarray, "n c"],
+    slopes: Float[np.ndarray, "n c i"],
+    along: Sequence[Float[np.ndarray, " n"]],
+    linear: Linear,
+) -> Float[np.ndarray, "i i"]:
+    """V: the jackknife along each of some angles, of the channels with a process, and the likelihood's of the others.
+
+    Of a part of the rows the noise of each stands for that of `more`, too much by as many times less one.
+    """
+    asked, inverse = found.gain >= ASKED, np.linalg.inv(linear.known)
+    some = [blocks for blocks in map(ranges, along) if blocks.any()]
+    each = [left_out(r * asked, slopes * asked[:, None], linear.known, blocks, linear.more) for blocks in some]
+    moved = sum(each, np.zeros_like(inverse)) / max(len(each), 1)
+    weight = np.where(asked, -(linear.more - 1.0) * found.white, 1.0)
+    rest = linear.more * np.einsum("nci,c,ncj->ij", slopes, weight, slopes, optimize=True)
+    return moved + inverse @ rest @ inverse
 
 
 def _unchanged(data: Data, parameters: int, count: int) -> Correlation:

@@ -9,8 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-from fitmat.maths.normal import Z95
-
 RANK = 160
 """Most columns of the pivoted Cholesky factor that stands for the K of a part."""
 
@@ -26,9 +24,6 @@ COARSE = np.concatenate([[0.0], np.logspace(-4.0, 6.0, 41)])
 FINE = np.logspace(-0.25, 0.25, 13)
 """Times the best of these, that are tried then."""
 
-BEND = 1.25
-"""Factor of τ² over which the curvature of the likelihood is taken."""
-
 ASKED = 3.0
 """Nats by which the processes must raise the restricted likelihood; below, they are left out and no interval changes.
 
@@ -38,11 +33,10 @@ for each part (½χ₀² + ½χ₁²: Self & Liang 1987).
 
 
 class Found(NamedTuple):
-    """Of each channel: η², (c,), τ and τ² with what is not known of it of each part, (c, b), and nats, (c,)."""
+    """Of each channel: η², (c,), τ of each part, (c, b), and nats, (c,)."""
 
     white: np.ndarray
     size: np.ndarray
-    allowance: np.ndarray
     gain: np.ndarray
 
 
@@ -68,8 +62,7 @@ def find(
 ) -> Found:
     """The sizes of each channel; one whose residuals ask for no process counts as its likelihood has it."""
     channels, parts = r.shape[1], len(k.roots)
-    none = np.zeros((channels, parts)), np.zeros((channels, parts)), np.full(channels, np.nan)
-    found = Found(np.ones(channels), *none)
+    found = Found(np.ones(channels), np.zeros((channels, parts)), np.full(channels, np.nan))
     for j in range(channels):
         these = used[:, j]
         basis = _basis(slopes[these, j])
@@ -78,7 +71,7 @@ def find(
         one = sizes(r[these, j], basis, [root[these] for root in k.roots])
         found.gain[j] = one.gain
         if one.gain >= ASKED:
-            found.white[j], found.size[j], found.allowance[j] = one.white, np.sqrt(one.process), one.allowance
+            found.white[j], found.size[j] = one.white, np.sqrt(one.process)
     return found
 
 
@@ -105,20 +98,6 @@ def counted(used: Bool[np.ndarray, "n c"], k: Kernel) -> Counts:
             known[mask.tobytes()] = [float(np.sum((part.T @ part) ** 2)) for part in parts]
     alike = np.array([known[mask.tobytes()] for mask in used.T])
     return Counts(used.sum(axis=0), used.T.astype(float) @ k.rows.T, alike)
-
-
-def meat(
-    found: Found, slopes: Float[np.ndarray, "n c i"], counts: Counts, rows: Bool[np.ndarray, "b n"], more: float
-) -> Float[np.ndarray, "i i"]:
-    """Jᵀ Σ J of `more` times as many values, where every reading of a part stands for as many as are like it.
-
-    A part's n readings count as m = (tr K)²/tr K² independent ones: Kish's design effect n/m, "Survey Sampling" (1965),
-    ch. 8.2. Jᵀ K J itself would take the misfit to be as unlike a change of the parameters as K's smoothness lets it
-    be; but what a fit has absorbed was like one, and is not seen in its residuals. The channels' misfits count as one.
-    """
-    repeats = np.divide(counts.alike, counts.part, out=np.zeros_like(counts.alike), where=counts.part > 0)
-    shared = more * np.einsum("nci,cn->ni", slopes, np.sqrt(found.allowance * repeats) @ rows, optimize=True)
-    return more * np.einsum("nci,c,ncj->ij", slopes, found.white, slopes, optimize=True) + shared.T @ shared
 
 
 def independent(found: Found, counts: Counts, more: float) -> float:
@@ -175,20 +154,11 @@ class Sizes(NamedTuple):
         white: η².
         process: τ², (b,).
         gain: Nats over no process at all.
-        freedom: Degrees of freedom with which τ² is known, as of the mean of so many squares, (b,): −2 d²ℓ/d(ln τ²)².
     """
 
     white: float
     process: np.ndarray
     gain: float
-    freedom: np.ndarray
-
-    @property
-    def allowance(self) -> Float[np.ndarray, " b"]:
-        """τ² with what is not known of it: intervals of Student's t, not of the normal distribution."""
-        from scipy.special import stdtrit
-
-        return self.process * (stdtrit(np.maximum(self.freedom, 1.5), 0.975) / Z95) ** 2
 
 
 def sizes(
@@ -209,12 +179,11 @@ def sizes(
     if len(parts) > 1 and logs.max() - without[least].max() < ASKED:
         tried[least], kept = COARSE[:1], without[least]
     tried = [x * FINE if x else COARSE[:1] for x in _best(kept, tried)]
-    best = _best(_likelihood(parts, tried, r, basis)[0], tried)
-    about, white = _likelihood(parts, [x * np.array([1.0 / BEND, 1.0, BEND]) for x in best], r, basis)
-    bent = [np.diff(about, 2, axis=b)[tuple(int(j != b) for j in places)] for b in places]
-    middle = (1,) * len(parts)
-    level, gain = float(white[middle]), float(about[middle] - logs.flat[0])
-    return Sizes(level, np.array(best) * level, gain, -2.0 * np.array(bent) / np.log(BEND) ** 2)
+    fine, white = _likelihood(parts, tried, r, basis)
+    top = np.unravel_index(np.argmax(fine), fine.shape)
+    level = float(white[top])
+    best = np.array([ratios[k] for ratios, k in zip(tried, top, strict=True)])
+    return Sizes(level, best * level, float(fine[top] - logs.flat[0]))
 
 
 def _best(logs: np.ndarray, tried: Sequence[np.ndarray]) -> list[float]:
