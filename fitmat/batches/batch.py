@@ -19,7 +19,7 @@ from fitmat.batches import rows, workers
 from fitmat.batches.jobs import Job, digest, every_file, from_table
 from fitmat.errors import FitmatError, OutputError
 from fitmat.studies.plan import DEFAULT_MODELS, named, wants_all
-from fitmat.text import visible
+from fitmat.text import brief, visible
 
 TABLE, PARTS = "results.parquet", "parts"
 """What a batch leaves in its folder: the table, and the rows of each file by key."""
@@ -38,6 +38,8 @@ class Batch:
     file: Path
     table: pl.DataFrame
     counts: Mapping[str, int]
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         """How many files were fitted, how many were not and why."""

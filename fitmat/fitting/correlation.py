@@ -2,14 +2,15 @@
 
 A likelihood that counts the misfit of each sample as independent gets narrower with every reading, however alike the
 misfits of neighbours are. Here the residuals of a finished fit are taken as noise plus smooth processes over the
-geometry, η² I + Σ τ² K: one within `NEAR` widths of the lobe, one beyond, for a misfit of the highlight says nothing of
-the base. All sizes are found by restricted maximum likelihood, which allows for the parameters that were fitted
+geometry, η² I + Σ τ² K: one within `NEAR` widths of the lobe, one beyond, for a misfit of the highlight says nothing
+of the base. All sizes are found by restricted maximum likelihood, which allows for the parameters that were fitted
 (Patterson & Thompson, Biometrika 58, 1971), each channel by itself. Where there is a process, the covariance V of the
 parameters is that of the jackknife which leaves out ranges of the difference angle θ_d, and of the incidence, in turn
-(`left_blocks`), the mean of the two: how much a range more or less would move them is seen, not modelled. It is never
-narrower than H⁻¹ in any direction. Channels without a process add what their likelihood says. Draws θ become
-θ̂ + A(θ − θ̂) with A H⁻¹ Aᵀ = V (Shaby, "The open-faced sandwich adjustment for MCMC using estimating functions",
-J. Comp. Graph. Stat. 23, 2014), so that whatever follows from draws follows from these. The best fit stays.
+(`left_blocks`), the sum of the two, as misfits run along both (Cameron, Gelbach & Miller, J. Bus. Econ. Stat. 29
+(2011), 238): how much a range more or less would move them is seen, not modelled. It is never narrower than H⁻¹ in
+any direction. Channels without a process add what their likelihood says. Draws θ become θ̂ + A(θ − θ̂) with A H⁻¹ Aᵀ
+= V (Shaby, "The open-faced sandwich adjustment for MCMC using estimating functions", J. Comp. Graph. Stat. 23, 2014),
+so that whatever follows from draws follows from these. The best fit stays.
 
 K is Matérn's of smoothness 3/2 over where the half vector lies about the normal, at distance asinh(θ_h/w) with the
 lobe's width w (an even scale up to one width, ratios beyond) and at its azimuth from the plane of incidence, and over
@@ -23,7 +24,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from fitmat.fitting.coordinates import Coordinates
-from fitmat.fitting.left_blocks import left_out, ranges
+from fitmat.fitting.left_blocks import left_out, of_few, ranges
 from fitmat.fitting.likelihood import Data
 from fitmat.fitting.linear import Linear
 from fitmat.fitting.process import ASKED, Found, counted, find, independent, kernel
@@ -145,9 +146,11 @@ def _spread(
     Of a part of the rows the noise of each stands for that of `more`, too much by as many times less one.
     """
     asked, inverse = found.gain >= ASKED, np.linalg.inv(linear.known)
-    some = [blocks for blocks in map(ranges, along) if blocks.any()]
-    each = [left_out(r * asked, slopes * asked[:, None], linear.known, blocks, linear.more) for blocks in some]
-    moved = sum(each, np.zeros_like(inverse)) / max(len(each), 1)
+    each = [blocks for blocks in map(ranges, along) if blocks.any()]
+    moved = np.zeros_like(inverse)
+    for blocks in each:
+        moved += left_out(r * asked, slopes * asked[:, None], linear.known, blocks, linear.more)
+    moved *= of_few(max(sum(int(blocks.max()) for blocks in each), 1))
     weight = np.where(asked, -(linear.more - 1.0) * found.white, 1.0)
     rest = linear.more * np.einsum("nci,c,ncj->ij", slopes, weight, slopes, optimize=True)
     return moved + inverse @ rest @ inverse

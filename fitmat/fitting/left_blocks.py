@@ -34,10 +34,9 @@ def left_out(
 ) -> Float[np.ndarray, "i i"]:
     """(g − 1)/g Σ (δ_k − δ̄)(δ_k − δ̄)ᵀ over g blocks, δ_k = (H − H_k)⁻¹ s_k: the jackknife that leaves out a block.
 
-    Tukey, Ann. Math. Stat. 29 (1958), 614; of blocks, Künsch, Ann. Stat. 17 (1989), 1217. As of a mean of g numbers,
-    the intervals are Student's with g − 1 degrees of freedom (Ibragimov & Müller, J. Bus. Econ. Stat. 28 (2010), 453).
-    Residuals as the likelihood counts them are of one size, so that s_k = Σ J r; what a fit has absorbed of a misfit
-    is seen in how it moves without a block.
+    Tukey, Ann. Math. Stat. 29 (1958), 614; of blocks, Künsch, Ann. Stat. 17 (1989), 1217. Residuals as the likelihood
+    counts them are of one size, so that s_k = Σ J r; what a fit has absorbed of a misfit is seen in how it moves
+    without a block.
 
     Args:
         r: Residuals.
@@ -46,18 +45,23 @@ def left_out(
         blocks: Which block each row belongs to.
         more: How many values were fitted for each of these.
     """
-    from scipy.special import stdtrit
-
     least, moves = LEAST * np.diag(np.diagonal(known)), []
     for block in np.unique(blocks):
         j, one = slopes[blocks == block], r[blocks == block]
         rest = known - more * np.einsum("nci,ncj->ij", j, j, optimize=True)
         moves.append(more * np.linalg.solve(_positive(rest, known) + least, np.einsum("nci,nc->i", j, one)))
-    count = len(moves)
-    if count < 2:
-        return np.zeros_like(known)
     apart = np.array(moves) - np.mean(moves, axis=0)
-    return (stdtrit(count - 1, 0.975) / Z95) ** 2 * (count - 1) / count * apart.T @ apart
+    return (len(moves) - 1) / len(moves) * apart.T @ apart
+
+
+def of_few(freedom: int) -> float:
+    """Factor of a variance known with so many degrees of freedom: intervals are Student's instead of the normal's.
+
+    As of a mean of g numbers, g − 1 (Ibragimov & Müller, J. Bus. Econ. Stat. 28 (2010), 453).
+    """
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, 0.975) / Z95) ** 2
 
 
 def _positive(rest: Float[np.ndarray, "i i"], known: Float[np.ndarray, "i i"]) -> Float[np.ndarray, "i i"]:

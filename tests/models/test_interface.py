@@ -157,7 +157,7 @@ UP = np.array([[0.0, 0.0, 1.0]])
         (lambda: fm.evaluate_interface(surface(0.3, eta=1.0), UP, -UP), "eta = 1 of the surface: light passes"),
         (lambda: fm.evaluate_interface(surface(0.3, eta=-1.5), UP, -UP), "eta of the surface = -1.5: expected an"),
         (lambda: fm.evaluate_interface(surface(0.3), UP, -2 * UP), "wo row 0 has length 2: expected unit vectors"),
-        (lambda: fm.evaluate_interface(surface(0.3), UP[0], -UP), r"shapes \(3,\) and \(1, 3\): expected the same"),
+        (lambda: fm.evaluate_interface(surface(0.3), UP[0], -UP), r"shapes \(3,\) and \(1, 3\): expected \(n, 3\)"),
         (
             lambda: fm.evaluate_interface(surface(0.3), UP, UP, masking="v-cavity"),
             "masking 'v-cavity': expected one of",
