@@ -1,4 +1,7 @@
-"""The command line: parse, one library call, print. The only room that speaks."""
+"""Commands that begin with measurements or make some: parse, one library call, print.
+
+Those that begin with a result, a model or nothing are in `afterwards`.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -6,21 +9,9 @@ from typing import Any
 import typer
 
 from fitmat.cli import examples, process
+from fitmat.cli.entry import app
 from fitmat.cli.flags.batch import BatchOutFlag, JobsFlag, McmcFlag, ProcessesFlag, SourcesFlag
-from fitmat.cli.flags.cache import ClearFlag
 from fitmat.cli.flags.design import CountFlag, ForFlag, KindFlag
-from fitmat.cli.flags.export import (
-    ExportOutFlag,
-    MaterialNameFlag,
-    NoVerifyFlag,
-    OneModelFlag,
-    ReplaceExportFlag,
-    ResultFlag,
-    StepFlag,
-    StrictFlag,
-    TableThetaIFlag,
-    TargetFlag,
-)
 from fitmat.cli.flags.files import (
     ConvertedFlag,
     DesignPlotFlag,
@@ -29,7 +20,6 @@ from fitmat.cli.flags.files import (
     OutFlag,
     PlotFlag,
     ReplaceFlag,
-    ReplacePageFlag,
     ReplacePlotFlag,
     files,
 )
@@ -50,18 +40,7 @@ from fitmat.cli.flags.given import Command
 from fitmat.cli.flags.groups import takes
 from fitmat.cli.flags.instrument import instrument
 from fitmat.cli.flags.labs import LaboratoriesFlag, SurfaceFlag
-from fitmat.cli.flags.models import CheckFlag, NameFlag
 from fitmat.cli.flags.reading import reading
-from fitmat.cli.flags.render import (
-    ExposureFlag,
-    HdrFlag,
-    LightFlag,
-    PicturedFlag,
-    PictureFlag,
-    PictureSetFlag,
-    ReplacePictureFlag,
-    SizeFlag,
-)
 from fitmat.cli.flags.simulate import (
     CatalogueFlag,
     FloorFlag,
@@ -76,31 +55,10 @@ from fitmat.cli.flags.simulate import (
     ThetaIFlag,
     ThetaOFlag,
 )
-from fitmat.cli.flags.version import VersionFlag
 from fitmat.text import visible
 
 DEFAULT_MODELS = "lambert+blinn-phong,lambert+ggx"
 NOT_CONVERGED = 3
-
-app = typer.Typer(
-    no_args_is_help=True,
-    context_settings={"help_option_names": ["--help", "-h"]},
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    epilog="Examples: [bold]fitmat fit measurements.csv[/bold] writes measurements-fitmat/report.html; "
-    "[bold]fitmat models ggx[/bold] explains a model; "
-    "[bold]fitmat simulate lambert+ggx --set alpha=0.2[/bold] makes data to try it on.",
-    help="Turn measured reflectance into a material you can trust: fitted BRDF models, honest uncertainties, and how "
-    "closely the empirical Phong model matches the microfacet model.\n\n"
-    "Exit codes: 0 all fits converged; 1 wrong input; 2 wrong usage; 3 a fit ended otherwise (the report is written); "
-    "130 stopped with Ctrl-C before there was anything to report. A page that cannot be "
-    "made is said and changes none of these: the numbers are saved first.",
-)
-
-
-@app.callback()
-def about(version: VersionFlag = False) -> None:
-    """What holds for every command."""
 
 
 @app.command(
@@ -228,82 +186,6 @@ def convert(
     process.say("\n".join([*convert.written(files, reading, out, force=force), visible(str(out))]))
 
 
-@app.command(cls=Command)
-def report(
-    result: ResultFlag,
-    force: ReplacePageFlag = False,
-) -> None:
-    """Make the page of a run again from what it left on disk, as after an update of fitmat."""
-    process.set_up()
-    from fitmat.reports import page
-    from fitmat.studies.result import load
-
-    process.say(visible(str(page.report(load(result), force=force))))
-
-
-@app.command(cls=Command, epilog=examples.EXPORT)
-def export(
-    result: ResultFlag,
-    to: TargetFlag = "glsl",
-    out: ExportOutFlag = None,
-    model: OneModelFlag = None,
-    name: MaterialNameFlag = None,
-    theta_i: TableThetaIFlag = None,
-    step: StepFlag = None,
-    strict: StrictFlag = False,
-    no_verify: NoVerifyFlag = False,
-    force: ReplaceExportFlag = False,
-) -> None:
-    """Write the fitted material for a renderer, run it there, and say how far it is from the fit."""
-    process.set_up()
-    from fitmat.cli import export
-
-    options = {"strict": strict, "verify": not no_verify, "force": force}
-    options |= {"model": model, "name": name} | export.grid(theta_i, step)
-    process.say(str(export.written(result, to, out, **options)))
-
-
-@app.command(cls=Command, epilog=examples.RENDER)
-def render(
-    what: PicturedFlag,
-    out: PictureFlag = Path("ball.png"),
-    set_: PictureSetFlag = None,
-    masking: MaskingFlag = None,
-    model: OneModelFlag = None,
-    light: LightFlag = None,
-    size: SizeFlag = 256,
-    exposure: ExposureFlag = None,
-    hdr: HdrFlag = False,
-    force: ReplacePictureFlag = False,
-) -> None:
-    """Draw a material on a ball under lights, from our own values: a fitted one, or a model of given values."""
-    process.set_up()
-    from fitmat.cli import render
-
-    render.refuse(out, hdr=hdr, force=force)
-    found = render.drawn(what, set_ or [], masking, light or [], model=model, size=size, exposure=exposure)
-    written = found.save(out, hdr=hdr)
-    process.say("\n".join([str(found), *(visible(str(path)) for path in written)]))
-
-
-@app.command(cls=Command)
-def models(
-    name: NameFlag = None,
-    check: CheckFlag = False,
-) -> None:
-    """List the models, or print the manual page of one: formula, parameters, limits, reference, laws."""
-    from fitmat.cli import manual
-
-    if check:
-        process.set_up()
-        if surprises := manual.check(only=manual.within(name)):
-            process.end(f"{', '.join(surprises)} break a law that their manual pages do not mention.")
-    elif name is None:
-        manual.list_models()
-    else:
-        manual.page(name)
-
-
 @app.command(
     cls=Command,
     epilog=examples.DESIGN,
@@ -400,26 +282,3 @@ def batch(
     batch.show(found)
     if found.counts["refused"]:
         raise typer.Exit(NOT_CONVERGED)
-
-
-@app.command(cls=Command)
-def losses() -> None:
-    """List what a fit can minimise, by name: the default, other likelihoods, and the objectives of the literature."""
-    from fitmat.cli import manual
-
-    manual.list_losses()
-
-
-@app.command(cls=Command)
-def cache(
-    clear: ClearFlag = False,
-) -> None:
-    """Say where compiled programs are kept and how many there are; they spare each run the compiling of the first."""
-    from fitmat.maths import program_files
-
-    found = program_files.kept()
-    if clear and found.folder is not None:
-        program_files.remove()
-        process.say(f"{found.amount}, were removed from the folder {found.folder}.")
-    else:
-        process.say(found.words)

@@ -23,7 +23,7 @@ def main() -> None:
     from fitmat.cli import process
 
     process.prepare_streams()
-    from fitmat.cli.commands import app
+    from fitmat.cli.application import app
 
     # A run is short and makes few reference cycles; looking for them, at the end above all, takes a fifth of its time.
     gc.disable()

@@ -10,7 +10,7 @@ from typer.main import get_command
 from typer.testing import CliRunner, Result
 
 from fitmat.cli import manual
-from fitmat.cli.commands import app
+from fitmat.cli.application import app
 from fitmat.models.registry import LOBES
 
 FILE = str(Path(__file__).parents[2] / "data" / "synthetic" / "sparse.csv")

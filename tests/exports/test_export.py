@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 import fitmat as fm
-from fitmat.cli.commands import app
+from fitmat.cli.application import app
 from fitmat.errors import FitmatError, ModelError, OutputError
 from fitmat.exports import browser
 from fitmat.exports import export as room

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 import fitmat as fm
-from fitmat.cli.commands import app
+from fitmat.cli.application import app
 from fitmat.errors import ModelError, ReadAs
 from fitmat.models.parameters import entries, vector
 

@@ -1,0 +1,136 @@
+"""Commands that begin with a result, a model or nothing: parse, one library call, print.
+
+Those that begin with measurements are in `commands`.
+"""
+
+from pathlib import Path
+
+from fitmat.cli import examples, process
+from fitmat.cli.entry import app
+from fitmat.cli.flags.cache import ClearFlag
+from fitmat.cli.flags.export import (
+    ExportOutFlag,
+    MaterialNameFlag,
+    NoVerifyFlag,
+    OneModelFlag,
+    ReplaceExportFlag,
+    ResultFlag,
+    StepFlag,
+    StrictFlag,
+    TableThetaIFlag,
+    TargetFlag,
+)
+from fitmat.cli.flags.files import ReplacePageFlag
+from fitmat.cli.flags.fitting import MaskingFlag
+from fitmat.cli.flags.given import Command
+from fitmat.cli.flags.models import CheckFlag, NameFlag
+from fitmat.cli.flags.render import (
+    ExposureFlag,
+    HdrFlag,
+    LightFlag,
+    PicturedFlag,
+    PictureFlag,
+    PictureSetFlag,
+    ReplacePictureFlag,
+    SizeFlag,
+)
+from fitmat.text import visible
+
+
+@app.command(cls=Command)
+def report(
+    result: ResultFlag,
+    force: ReplacePageFlag = False,
+) -> None:
+    """Make the page of a run again from what it left on disk, as after an update of fitmat."""
+    process.set_up()
+    from fitmat.reports import page
+    from fitmat.studies.result import load
+
+    process.say(visible(str(page.report(load(result), force=force))))
+
+
+@app.command(cls=Command, epilog=examples.EXPORT)
+def export(
+    result: ResultFlag,
+    to: TargetFlag = "glsl",
+    out: ExportOutFlag = None,
+    model: OneModelFlag = None,
+    name: MaterialNameFlag = None,
+    theta_i: TableThetaIFlag = None,
+    step: StepFlag = None,
+    strict: StrictFlag = False,
+    no_verify: NoVerifyFlag = False,
+    force: ReplaceExportFlag = False,
+) -> None:
+    """Write the fitted material for a renderer, run it there, and say how far it is from the fit."""
+    process.set_up()
+    from fitmat.cli import export
+
+    options = {"strict": strict, "verify": not no_verify, "force": force}
+    options |= {"model": model, "name": name} | export.grid(theta_i, step)
+    process.say(str(export.written(result, to, out, **options)))
+
+
+@app.command(cls=Command, epilog=examples.RENDER)
+def render(
+    what: PicturedFlag,
+    out: PictureFlag = Path("ball.png"),
+    set_: PictureSetFlag = None,
+    masking: MaskingFlag = None,
+    model: OneModelFlag = None,
+    light: LightFlag = None,
+    size: SizeFlag = 256,
+    exposure: ExposureFlag = None,
+    hdr: HdrFlag = False,
+    force: ReplacePictureFlag = False,
+) -> None:
+    """Draw a material on a ball under lights, from our own values: a fitted one, or a model of given values."""
+    process.set_up()
+    from fitmat.cli import render
+
+    render.refuse(out, hdr=hdr, force=force)
+    found = render.drawn(what, set_ or [], masking, light or [], model=model, size=size, exposure=exposure)
+    written = found.save(out, hdr=hdr)
+    process.say("\n".join([str(found), *(visible(str(path)) for path in written)]))
+
+
+@app.command(cls=Command)
+def models(
+    name: NameFlag = None,
+    check: CheckFlag = False,
+) -> None:
+    """List the models, or print the manual page of one: formula, parameters, limits, reference, laws."""
+    from fitmat.cli import manual
+
+    if check:
+        process.set_up()
+        if surprises := manual.check(only=manual.within(name)):
+            process.end(f"{', '.join(surprises)} break a law that their manual pages do not mention.")
+    elif name is None:
+        manual.list_models()
+    else:
+        manual.page(name)
+
+
+@app.command(cls=Command)
+def losses() -> None:
+    """List what a fit can minimise, by name: the default, other likelihoods, and the objectives of the literature."""
+    from fitmat.cli import manual
+
+    manual.list_losses()
+
+
+@app.command(cls=Command)
+def cache(
+    clear: ClearFlag = False,
+) -> None:
+    """Say where compiled programs are kept and how many there are; they spare each run the compiling of the first."""
+    from fitmat.maths import program_files
+
+    found = program_files.kept()
+    if clear and found.folder is not None:
+        program_files.remove()
+        process.say(f"{found.amount}, were removed from the folder {found.folder}.")
+    else:
+        process.say(found.words)
