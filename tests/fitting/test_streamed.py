@@ -34,7 +34,7 @@ SAME_COVARIANCE = 1e-5
 """Relative; where exponent ± 3 % differs by `SAME` of its standard deviation, its curvature differs by this."""
 
 PART_OF_THE_ROWS = 0.25
-"""Relative, of variances: other rows stand for all where the correlation of the misfit is asked."""
+"""Relative, of widths: other rows stand for all where the correlation of the misfit is asked."""
 
 BENT = 0.02
 """Relative, of a covariance whose second-order part comes from 12,000 of 48,000 rows."""
@@ -77,7 +77,8 @@ def assert_same(found: Fit, whole: Fit) -> None:
     assert (found.result, found.undetermined) == (whole.result, whole.undetermined)
     assert np.abs(deviations(found, whole)).max() < SAME
     np.testing.assert_allclose(found.likelihood_covariance, whole.likelihood_covariance, rtol=SAME_COVARIANCE)
-    np.testing.assert_allclose(found.correlation.inflation, whole.correlation.inflation, rtol=PART_OF_THE_ROWS)
+    wider = [np.sqrt(fit.correlation.inflation) for fit in (found, whole)]
+    np.testing.assert_allclose(*wider, rtol=PART_OF_THE_ROWS)
     assert found.discrepancy == pytest.approx(whole.discrepancy, rel=SAME_COVARIANCE)
     assert found.log_likelihood == pytest.approx(whole.log_likelihood, rel=0, abs=SAME_LIKELIHOOD)
     assert found.information.shape == whole.information.shape
