@@ -24,6 +24,14 @@ from fitmat.cli.flags.files import ReplacePageFlag
 from fitmat.cli.flags.fitting import MaskingFlag
 from fitmat.cli.flags.given import Command
 from fitmat.cli.flags.models import CheckFlag, NameFlag
+from fitmat.cli.flags.plot import (
+    CornerModelFlag,
+    DrawnChannelFlag,
+    PaperFlag,
+    ReplacePaperFlag,
+    WhatFlag,
+    WidthFlag,
+)
 from fitmat.cli.flags.render import (
     ExposureFlag,
     HdrFlag,
@@ -48,6 +56,26 @@ def report(
     from fitmat.studies.result import load
 
     process.say(visible(str(page.report(load(result), force=force))))
+
+
+@app.command(cls=Command, epilog=examples.PLOT)
+def plot(
+    result: ResultFlag,
+    what: WhatFlag = "curves",
+    out: PaperFlag = Path("figure.pdf"),
+    channel: DrawnChannelFlag = None,
+    model: CornerModelFlag = None,
+    width: WidthFlag = 84.0,
+    force: ReplacePaperFlag = False,
+) -> None:
+    """Draw a picture of a run for a paper, and write its numbers beside it."""
+    process.set_up()
+    from fitmat.reports import paper
+    from fitmat.studies.result import load
+
+    told = {"channel": 0 if channel is None else channel, "model": model, "width_mm": width, "force": force}
+    written = paper.save(load(result), out, what, **told)
+    process.say("\n".join(visible(str(path)) for path in written))
 
 
 @app.command(cls=Command, epilog=examples.EXPORT)

@@ -76,3 +76,8 @@ EXPORT = (
     "  fitmat export run1 --to mitsuba --model lambert+ggx --name 'satin plastic' --out mine\n\n"
     "  fitmat export run1 --to table --theta-i 10,30,60 --step 2"
 )
+
+PLOT = (
+    "Examples:\n\n  fitmat plot run1 --what curves --out fit.pdf\n\n"
+    "  fitmat plot run1 --what residuals --channel g --width 178 --out residuals.svg"
+)

@@ -40,15 +40,15 @@ def refuse_picture(path: Path | None, *, force: bool) -> None:
         raise OutputError(f"{path}: no picture, expected a name that ends in {', '.join(KINDS)}. Rename it.")
 
 
-def write_picture(draw: Callable[[], "Figure"], path: Path) -> None:
-    """Write what `draw` draws in the format that the suffix names.
+def write_picture(draw: Callable[[], "Figure"], path: Path, *, exact: bool = False) -> None:
+    """Write what `draw` draws in the format that the suffix names; as large as it is if `exact`, else without margins.
 
     Raises:
         OutputError: it cannot be drawn or written.
     """
     buffer = io.BytesIO()
     try:
-        draw().savefig(buffer, format=_kind(path), dpi=DPI, bbox_inches="tight")
+        draw().savefig(buffer, format=_kind(path), dpi=DPI, bbox_inches=None if exact else "tight")
     except Exception as error:  # whatever a library of pictures comes upon
         raise OutputError(f"{path}: could not be drawn ({reason(error)}); what was found is complete.") from error
     write_bytes(path, buffer.getvalue())

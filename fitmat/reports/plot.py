@@ -1,7 +1,10 @@
-"""Pictures of measurements, fits and matches: `plot.x(thing, ax=None) -> Axes`.
+"""Pictures of studies, of runs on disk, of matches and files: `plot.x(thing) -> Figure`, or Axes of what fits in one.
 
-Computes nothing that another room could; the only importer of matplotlib.
+Computes nothing that another room could; draws what `studies.figures` holds.
 """
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,19 +12,15 @@ from matplotlib.figure import Figure
 
 from fitmat import arguments
 from fitmat.errors import FitmatError
-from fitmat.match.ablation import Ablation
 from fitmat.match.appearance.spheres import Perceived
 from fitmat.match.discernibility import SEPARATED, Telling
-from fitmat.match.match import Match
-from fitmat.match.regions import REGIONS
-from fitmat.maths.directions import signed_zenith
-from fitmat.reports.axes import BLACK, BLUE, FIT_COLOURS, GREEN, ORANGE, PURPLE, check_channel, plain
+from fitmat.reports.axes import BLACK, BLUE, FIT_COLOURS, ORANGE, plain
 from fitmat.reports.axes import new_axes as new_axes
 from fitmat.reports.design_plot import design as design
+from fitmat.reports.drawn import channel_of, drawn_of, draws_of, match_of, sections, values_of
 from fitmat.reports.examination_plots import examination as examination
-from fitmat.studies.findings import Findings
+from fitmat.studies.result import Result
 from fitmat.studies.study import Study
-from fitmat.uncertainty.posterior import Posterior
 
 MOST_DRAWN = 10.0
 """ΔE2000 from which on the map of a sphere is equally bright."""
@@ -29,58 +28,63 @@ MOST_DRAWN = 10.0
 DECADES = 1.5
 """A curve that spans more decades than this is drawn on a logarithmic axis."""
 
+MM = 25.4
+"""In an inch."""
 
-def curves(study: Study, *, channel: int = 0) -> Figure:
-    """Measured points with every fit and its band, one panel for each section."""
-    arguments.kind("study", study, Study)
-    check_channel(channel, study.measurements.channels)
-    along = range(len(study.findings[0].curves))
-    columns = 2 if len(along) in (2, 4) else min(3, len(along))
-    lines = -(-len(along) // columns)
-    width, height = max(3.6 * columns, 5.0), 2.7 * lines + 0.3
-    figure = Figure(figsize=(width, height))
-    # Set by hand: to let Matplotlib find the margins takes twice as long as all the rest.
-    figure.subplots_adjust(0.75 / width, 0.5 / height, 1 - 0.15 / width, 1 - 0.6 / height, 0.33, 0.42)
-    for k in along:
-        section(study, k, channel=channel, ax=figure.add_subplot(lines, columns, k + 1))
+LABELS_MM = 18.0
+"""What the labels of a corner take, left and below."""
+
+WIDTH_MM, NARROW_MM = 178.0, 120.0
+"""Of a figure over both columns of a page; below the second, panels stand one below the other."""
+
+
+def curves(what: Study | Result, *, channel: str | int = 0, width_mm: float = WIDTH_MM) -> Figure:
+    """Measured points with every fit and its band, one panel for each section.
+
+    Args:
+        what: A study, or the result of one from `fitmat.load`.
+        channel: By its name, or from 0.
+        width_mm: Of the figure.
+    """
+    found = drawn_of(what)
+    k, along = channel_of(found, channel), sections(found)
+    figure, panels = _grid(len(along), width_mm, 0.6)
+    for section, ax in zip(along, panels, strict=True):
+        _section(ax, section, k, found.get("inadequate", ()))
     handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="upper center", ncols=len(labels), fontsize=9, frameon=False)
+    figure.legend(
+        handles, labels, loc="outside upper center", ncols=1 if width_mm < NARROW_MM else len(labels), frameon=False
+    )
     return figure
 
 
-def section(study: Study, which: int = 0, *, channel: int = 0, ax: Axes | None = None) -> Axes:
-    """Measured points of one incidence angle with every fit and its 95 % predictive band.
+def _grid(count: int, width_mm: float, shape: float) -> tuple[Figure, list[Axes]]:
+    """As many panels as wanted, one beside the other as far as they fit, of this height to width."""
+    arguments.numbers("width_mm", width_mm, 40.0, 500.0, single=True)
+    columns = 1 if width_mm < NARROW_MM or count == 1 else 2 if count in (2, 4) else min(3, count)
+    lines, width = -(-count // columns), width_mm / MM
+    figure = Figure(figsize=(width, lines * shape * width / columns + 0.4), layout="constrained")
+    return figure, [figure.add_subplot(lines, columns, k + 1) for k in range(count)]
 
-    Args:
-        study: What was found.
-        which: Of the sections, in the order of `Findings.curves`.
-        channel: Which channel.
-        ax: Where to draw; a new figure if None.
-    """
-    arguments.kind("study", study, Study)
-    check_channel(channel, study.measurements.channels)
-    ax = ax or new_axes()
-    m, drawn = study.measurements, [found.curves[which] for found in study.findings]
-    place = drawn[0].section
-    used = m.valid[place.rows, channel]
-    angle, measured = np.rad2deg(place.theta_o[used]), m.value[place.rows[used], channel]
-    top = 0.0
-    for curve, colour in zip(drawn, FIT_COLOURS, strict=False):
-        low, high = curve.band[:, used, channel]
-        ax.fill_between(angle, low, high, color=colour, alpha=0.18, lw=0)
-        line = curve.value[:, channel]
-        top = max(top, float(line.max()))
-        ax.plot(np.rad2deg(curve.theta_o), line, color=colour, lw=1.3, label=curve.name)
-    ax.plot(angle, measured, ".", color=BLACK, ms=3.5, label="measured")
-    _set_scale(ax, measured, top)
-    ax.axvline(np.rad2deg(place.theta_i), color="0.75", lw=0.8, ls=":", zorder=0)
-    ax.set(xlim=(-90, 90), xticks=[-60, -30, 0, 30, 60])
-    azimuth = f", azimuth {np.rad2deg(place.phi_i):.4g}°" if place.phi_i else ""
-    ax.set_title(f"incidence {np.rad2deg(place.theta_i):.4g}°{azimuth}", fontsize=9)
-    ax.set_xlabel("θₒ / °  (positive = mirror side)", fontsize=8)
-    ax.set_ylabel("BRDF / sr⁻¹", fontsize=8)
-    ax.tick_params(labelsize=7)
-    return ax
+
+def _section(ax: Axes, section: Mapping[str, Any], k: int, outlined: Collection[str]) -> None:
+    """One incidence; of models that miss the data the band is outlined only, for it would flood the picture."""
+    measured = np.array(section["measured"][k], float)
+    used, angle, top = np.isfinite(measured), np.array(section["theta_o"], float), 0.0
+    for (name, one), colour in zip(section["models"].items(), FIT_COLOURS, strict=False):
+        low, high, line = (np.array(one[part][k], float) for part in ("low", "high", "value"))
+        if name in outlined:
+            ax.plot(angle[used], np.stack([low, high], axis=1)[used], color=colour, lw=0.7, ls=(0, (1, 2)))
+        else:
+            ax.fill_between(angle[used], low[used], high[used], color=colour, alpha=0.18, lw=0)
+        top = max(top, float(np.nanmax(line, initial=0.0)))
+        ax.plot(one["theta_o"], line, color=colour, lw=1.2, label=name)
+    ax.plot(angle[used], measured[used], ".", color=BLACK, ms=3.0, label="measured")
+    _set_scale(ax, measured[used], top)
+    ax.axvline(section["theta_i"], color="0.75", lw=0.8, ls=":", zorder=0)
+    azimuth = f", azimuth {section['phi_i']:.4g}°" if section["phi_i"] else ""
+    ax.set_title(f"incidence {section['theta_i']:.4g}°{azimuth}")
+    _against_reflection(ax, "BRDF / sr⁻¹")
 
 
 def _set_scale(ax: Axes, measured: np.ndarray, top: float) -> None:
@@ -94,74 +98,83 @@ def _set_scale(ax: Axes, measured: np.ndarray, top: float) -> None:
         ax.set_ylim(min(0.0, 1.2 * measured.min(initial=0.0)), 1.15 * highest)
 
 
-def residuals(found: Findings, *, channel: int = 0, ax: Axes | None = None) -> Axes:
-    """Standardised residuals of one channel against theta_o, one colour per incidence angle."""
-    arguments.kind("found", found, Findings)
-    check_channel(channel, found.fit.measurements.channels)
-    ax = ax or new_axes()
-    fit, z = found.fit, found.residuals[:, channel]
-    used = np.asarray(fit.data.weight)[:, channel] > 0
-    wi, wo = np.asarray(fit.data.wi), np.asarray(fit.data.wo)
-    theta_i = np.rad2deg(np.arccos(np.clip(wi[:, 2], -1, 1)))
-    drawn = ax.scatter(
-        np.rad2deg(signed_zenith(wi, wo))[used], z[used], c=theta_i[used], s=6, cmap="cividis", vmin=0, vmax=90
-    )
-    ax.axhspan(-2, 2, color="0.9", zorder=0)
-    ax.set(xlim=(-90, 90), xticks=[-60, -30, 0, 30, 60])
-    names = fit.measurements.channels
-    ax.set_title(fit.name + (f", channel {plain(names[channel])}" if len(names) > 1 else ""), fontsize=9)
-    ax.set_xlabel("θₒ / °  (positive = mirror side)", fontsize=8)
-    ax.set_ylabel("residual / standard deviations", fontsize=8)
-    ax.tick_params(labelsize=7)
-    ax.figure.colorbar(drawn, ax=ax, label="θᵢ / °")
-    return ax
+def residuals(what: Study | Result, *, channel: str | int = 0, width_mm: float = WIDTH_MM) -> Figure:
+    """Standardised residuals of a channel against theta_o, a panel for each model, a colour for each incidence.
+
+    Args:
+        what: A study, or the result of one from `fitmat.load`.
+        channel: By its name, or from 0.
+        width_mm: Of the figure.
+    """
+    found = drawn_of(what)
+    k, along = channel_of(found, channel), sections(found)
+    figure, panels = _grid(len(found["models"]), width_mm, 0.7)
+    for name, ax in zip(found["models"], panels, strict=True):
+        ax.axhspan(-2, 2, color="0.9", zorder=0)
+        points = [
+            (angle, z, section["theta_i"])
+            for section in along
+            for angle, z in zip(section["theta_o"], section["models"][name]["residual"][k], strict=True)
+            if z is not None
+        ]
+        angle, z, theta_i = np.array(points or np.zeros((0, 3))).T
+        ax.scatter(angle, z, c=theta_i, s=5, cmap="cividis", vmin=0, vmax=90)
+        ax.set_title(name)
+        _against_reflection(ax, "residual / standard deviations")
+    figure.colorbar(panels[0].collections[-1], ax=panels, label="θᵢ / °")
+    return figure
 
 
-def albedo(match: Match, ax: Axes | None = None) -> Axes:
-    """Directional albedo of both models with 95 % bands, channel mean."""
-    arguments.kind("match", match, Match)
-    ax = ax or new_axes()
-    angle = np.rad2deg(match.albedo_theta_i)
-    pairs = ((match.empirical, match.albedo_empirical), (match.microfacet, match.albedo_microfacet))
-    for (posterior, band), colour in zip(pairs, FIT_COLOURS, strict=False):
-        ax.fill_between(angle, band[0], band[2], color=colour, alpha=0.2, lw=0)
-        ax.plot(angle, band[1], color=colour, label=posterior.fit.name)
-    ax.axvline(match.albedo_gap_theta_i_deg, color="0.75", lw=0.8, ls=":", zorder=0)
+def _against_reflection(ax: Axes, label: str) -> None:
+    ax.set(xlim=(-90, 90), xticks=[-60, -30, 0, 30, 60], xlabel="θₒ / °  (positive = mirror side)", ylabel=label)
+
+
+def albedo(what: Study | Result, *, width_mm: float = WIDTH_MM) -> Figure:
+    """Directional albedo of both models of the match with 95 % bands, channel mean; grey: what was measured.
+
+    Args:
+        what: A study, or the result of one from `fitmat.load`.
+        width_mm: Of the figure.
+    """
+    match = match_of(drawn_of(what))
+    figure, (ax,) = _grid(1, width_mm, 0.7)
+    highest = 1.0
+    for (role, band), colour in zip(match["albedo"].items(), FIT_COLOURS, strict=False):
+        _band(ax, match["theta_i"], band, colour, match[role])
+        highest = max(highest, float(np.nanmax(np.array(band[1], float))))
     ax.axhline(1.0, color="0.5", lw=0.8, ls="--")
-    highest = max(float(band[1].max()) for _, band in pairs)
-    ax.set(xlim=(0, 90), ylim=(0, max(1.05, 1.1 * highest)))
-    ax.set_xlabel("incidence θᵢ / °")
-    ax.set_ylabel("directional albedo ρ(θᵢ)")
-    ax.legend(fontsize=8)
-    return ax
+    ax.set_ylim(0.0, 1.1 * highest)
+    _measured(ax, match)
+    _against_incidence(ax, "directional albedo ρ(θᵢ)")
+    return figure
 
 
-def distances(match: Match, metric: str = "relative", ax: Axes | None = None) -> Axes:
-    """Distance of the two models at each incidence, over all directions and in each region, with 95 % bands."""
-    arguments.kind("match", match, Match)
-    ax = ax or new_axes()
-    angle, found = np.rad2deg(match.distances.theta_i), match.distances
-    parts = np.moveaxis(found.by_incidence_and_region[metric], 2, 0)
-    for band, name, colour in zip(parts, REGIONS, FIT_COLOURS, strict=True):
-        ax.plot(angle, band[1], color=colour, lw=1.0, ls="--", label=name)
-    whole = found.by_incidence[metric]
-    ax.fill_between(angle, whole[0], whole[2], color=BLACK, alpha=0.2, lw=0)
-    ax.plot(angle, whole[1], color=BLACK, label="all directions")
+def distances(what: Study | Result, *, width_mm: float = WIDTH_MM) -> Figure:
+    """Relative distance of the two models at each incidence, with its 95 % band, and what each region adds to it.
+
+    Args:
+        what: A study, or the result of one from `fitmat.load`.
+        width_mm: Of the figure.
+    """
+    match = match_of(drawn_of(what))
+    figure, (ax,) = _grid(1, width_mm, 0.7)
+    for (region, band), colour in zip(match["by_region"].items(), FIT_COLOURS, strict=True):
+        ax.plot(match["theta_i"], np.array(band[1], float), color=colour, lw=1.0, ls="--", label=region)
+    _band(ax, match["theta_i"], match["distance"], BLACK, "all directions")
     ax.set_ylim(bottom=0.0)
-    return _against_incidence(ax, f"{metric} distance")
+    _measured(ax, match)
+    _against_incidence(ax, "relative distance of the models")
+    return figure
 
 
-def ablation(ablation: Ablation, ax: Axes | None = None) -> Axes:
-    """By how much the distance falls at each incidence without each term of the microfacet lobe, with 95 % bands."""
-    arguments.kind("ablation", ablation, Ablation)
-    ax = ax or new_axes()
-    angle = np.rad2deg(ablation.theta_i)
-    for (term, fall), colour in zip(ablation.fall.items(), (BLUE, GREEN, PURPLE, BLACK), strict=True):
-        ax.fill_between(angle, 100 * fall[0], 100 * fall[2], color=colour, alpha=0.2, lw=0)
-        ax.plot(angle, 100 * fall[1], color=colour, label="all three" if term == "all" else term)
-    ax.axhline(0.0, color="0.5", lw=0.8, ls="--")
-    ax.set_ylim(bottom=max(-100.0, ax.get_ylim()[0]))  # twice the distance
-    return _against_incidence(ax, "fall of the distance / %")
+def _band(ax: Axes, angle: Sequence[float], band: Sequence[Sequence[float]], colour: str, label: str) -> None:
+    low, best, high = np.array(band, float)
+    ax.fill_between(angle, low, high, color=colour, alpha=0.2, lw=0)
+    ax.plot(angle, best, color=colour, label=label)
+
+
+def _measured(ax: Axes, match: Mapping[str, Any]) -> None:
+    ax.axvspan(*match["measured_deg"], color="0.93", zorder=0)
 
 
 def telling(telling: Telling, ax: Axes | None = None) -> Axes:
@@ -213,31 +226,40 @@ def spheres(perceived: Perceived) -> Figure:
     return figure
 
 
-def corner(posterior: Posterior) -> Figure:
-    """Every free parameter against every other, with the best fit marked; fixed ones are left out."""
-    arguments.kind("posterior", posterior, Posterior)
+def corner(what: Study | Result, model: str | None = None, *, width_mm: float = WIDTH_MM) -> Figure:
+    """Every free parameter against every other, with the best fit marked; fixed ones are left out.
+
+    Args:
+        what: A study, or the result of one from `fitmat.load`.
+        model: Which model; None for the last that has draws.
+        width_mm: Of the figure.
+    """
     from corner import corner as corner_plot  # loads scipy
 
-    fit = posterior.fit
-    symbols = [e.param.symbol for e in fit.entries for _ in range(e.size)]
-    columns, labels = list(fit.coordinates.places), []
-    for name, k in zip(fit.coordinates.names, columns, strict=True):
-        channel = name.partition(" ")[1] + name.partition(" ")[2]
-        labels.append(symbols[k].replace("k_d", "$k_d$").replace("k_s", "$k_s$") + plain(channel))
-    draws = posterior.thinned(4000)[0][:, columns]
-    spread = np.ptp(draws, axis=0)
-    centre = draws.mean(axis=0)
+    _, known = draws_of(drawn_of(what), model)
+    draws, best, labels = values_of(known), known["best"], _labels(known)
+    arguments.numbers("width_mm", width_mm, 40.0, 500.0, single=True)
     ranges = [
-        (low, high) if s > 0 else (c - 0.5, c + 0.5)
-        for low, high, s, c in zip(*np.quantile(draws, [0.001, 0.999], axis=0), spread, centre, strict=True)
+        (low, high) if high > low else (low - 0.5, low + 0.5)
+        for low, high in np.quantile(draws, [0.001, 0.999], axis=0).T
     ]
-    side = 1.4 * len(columns) + 0.8
-    several = len(columns) > 1
+    several, side = len(labels) > 1, width_mm / MM
     figure = corner_plot(
-        draws, labels=labels, range=ranges, truths=fit.values[columns] if several else None, truth_color=ORANGE,
+        draws, labels=labels, range=ranges, truths=best if several else None, truth_color=ORANGE,
         color=BLUE, bins=24, quantiles=[0.025, 0.975], plot_datapoints=False, fig=Figure(figsize=(side, side)),
-        label_kwargs={"fontsize": 9}, labelpad=0.2, max_n_ticks=3, smooth=0.8,
+        labelpad=0.7 * LABELS_MM * len(labels) / (width_mm - LABELS_MM) - 0.3, max_n_ticks=3, smooth=0.8,
     )  # fmt: skip
+    margin = LABELS_MM / width_mm
+    figure.subplots_adjust(margin, margin, 0.98, 0.98, 0.06, 0.06)
     if not several:  # corner cannot mark the best fit of a single parameter
-        figure.axes[0].axvline(fit.values[columns[0]], color=ORANGE)
+        figure.axes[0].axvline(best[0], color=ORANGE)
     return figure
+
+
+def _labels(known: Mapping[str, Any]) -> list[str]:
+    """Symbols of the parameters, with the channel where each has its own."""
+    found = []
+    for name, symbol in zip(known["names"], known["symbols"], strict=True):
+        _, space, channel = name.partition(" ")
+        found.append(symbol.replace("k_d", "$k_d$").replace("k_s", "$k_s$") + space + plain(channel))
+    return found

@@ -48,6 +48,7 @@ def to_dict(study: Study) -> dict[str, Any]:
         "format": DRAWN,
         "file": m.source,
         "models": [found.name for found in shown],
+        "inadequate": [found.name for found in shown if found.doubts.inadequate],
         "channels": [m.channels[k] for k in channels],
         "left_out": _left_out(study, channels, maps),
         "curves": curves,

@@ -306,17 +306,6 @@ def test_the_headline_says_what_is_missing_at_grazing_incidence_and_why(match: M
 
 def test_the_pictures_show_the_numbers(match: Match) -> None:
     """Lines by their labels, against incidence in degrees."""
-    ablation = match.ablation
-    assert ablation is not None
-    angle = np.rad2deg(match.distances.theta_i)
-    shown = {
-        plot.distances(match, "albedo"): {"all directions": match.distances.by_incidence["albedo"][1]},
-        plot.ablation(ablation): {term: 100 * ablation.fall[term][1] for term in ("fresnel", "masking", "tail")},
-    }
-    for ax, expected in shown.items():
-        drawn = {line.get_label(): np.asarray(line.get_xydata()) for line in ax.lines}
-        for label, values in expected.items():
-            np.testing.assert_allclose(drawn[label], np.stack([angle, values], axis=1))
     ax = plot.telling(match.telling)
     points = {box.get_label(): box[0].get_xydata() for box in ax.containers}
     np.testing.assert_allclose(points["all readings"][:, 1], match.telling.separation[1])
