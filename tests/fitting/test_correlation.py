@@ -147,7 +147,11 @@ def test_widened_draws_have_the_covariance_that_is_quoted(wrong: Fit) -> None:
     assert posterior.description()["widened"].startswith(f"{wrong.n_values} readings count as ")
     sd = np.sqrt(np.diagonal(wrong.covariance))
     assert (sd > 2.0 * np.sqrt(np.diagonal(wrong.likelihood_covariance))).any()
-    np.testing.assert_allclose(posterior.values.std(axis=0) / sd, 1.0, atol=0.08)  # 2000 draws, and bounds
+    moved = wrong.coordinates
+    here = moved.natural(wrong.values)
+    free = np.minimum(here - moved.low, moved.high - here) > 3.0 * sd / moved.slope(wrong.values)
+    assert free.sum() >= 2  # those that no bound folds
+    np.testing.assert_allclose((posterior.values.std(axis=0) / sd)[free], 1.0, atol=0.08)  # 2000 draws
     ratio = wrong.covariance.diagonal() / wrong.likelihood_covariance.diagonal()
     np.testing.assert_allclose(wrong.correlation.inflation, ratio, rtol=0.02)  # of one on the range of the bounds
 

@@ -202,7 +202,7 @@ def test_a_sum_is_as_narrow_as_its_narrowest_lobe() -> None:
         ("ggx+", {}, r"model 'ggx\+': no lobe ''; try lambert, phong, ggx;"),
         ("ggx+ggx", {}, r"the same lobe twice cannot be told apart"),
         ("lambert", {"ks": 1.0}, r"model 'lambert' has no parameter 'ks'; it has kd\."),
-        ("ggx", {"roughness": 0.1}, r"has no parameter 'roughness'; it has alpha, eta, ks\."),
+        ("ggx", {"rough": 0.1}, r"has no parameter 'rough'; it has alpha, eta, ks\."),
         ("ggx", {"masking": "smith"}, r"masking 'smith': expected one of correlated, separable, v-cavity\."),
         ("lambert+phong", {"masking": "separable"}, r"model 'lambert\+phong' has no masking to choose"),
         ("ggx", {"alpha": 2.0}, r"parameter alpha = 2: expected a value from 0\.0001 to 1\."),
