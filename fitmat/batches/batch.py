@@ -18,11 +18,12 @@ from fitmat._types import Progress
 from fitmat.batches import rows, workers
 from fitmat.batches.jobs import Job, digest, every_file, from_table
 from fitmat.errors import FitmatError, OutputError
+from fitmat.reports import summary
 from fitmat.studies.plan import DEFAULT_MODELS, named, wants_all
 from fitmat.text import brief, visible
 
-TABLE, PARTS = "results.parquet", "parts"
-"""What a batch leaves in its folder: the table, and the rows of each file by key."""
+TABLE, PAGE, PARTS = "results.parquet", "index.html", "parts"
+"""What a batch leaves in its folder: the table, its page, and the rows of each file by key."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -65,7 +66,7 @@ def batch(
 
     Args:
         sources: Files, folders, patterns such as "scans/*.csv"; may be empty where `jobs` is given.
-        folder: For `results.parquet`, and what is kept to go on after an interruption.
+        folder: For `results.parquet` and its page `index.html`, and what is kept to go on after an interruption.
         models: As in `fitmat.study`.
         jobs: A table with a column `file`, and others for what differs from file to file: `columns`, `ior`, `fix`, ….
         reading: Arguments of `fitmat.read` for every file.
@@ -136,6 +137,7 @@ def _studied(every: Sequence[Job], target: Path, processes: int, say: Progress) 
     memory = io.BytesIO()
     table.write_parquet(memory)
     file = files.write_bytes(target / TABLE, memory.getvalue())
+    files.write_text(target / PAGE, _page(every, done))
     lost = sum(_lost(found) for found in done.values())
     before = sum(len(keys[key]) for key in earlier)
     return Batch(file, table, {"fitted": len(every) - lost, "refused": lost, "earlier": before})
@@ -144,6 +146,25 @@ def _studied(every: Sequence[Job], target: Path, processes: int, say: Progress) 
 def _of_file(file: str, message: str) -> str:
     name = visible(Path(file).name)
     return message if visible(message).startswith((name, visible(file))) else f"{name}: {message}"
+
+
+def _page(every: Sequence[Job], done: Mapping[int, list[dict[str, Any]]]) -> str:
+    """The page: of each file its best model, or why there is none."""
+    fitted = [_best(job, done[k]) for k, job in enumerate(every) if not _lost(done[k])]
+    refused = [{"message": done[k][0]["message"]} for k in range(len(every)) if _lost(done[k])]
+    return summary.to_html(fitted, refused)
+
+
+def _best(job: Job, found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    row = next((one for one in found if one["best"]), found[0])
+    levels = {f"{name}_level": row.get(f"{name}_level", "unknown") for name in rows.CARDS}
+    numbers = {
+        "delta_e": row.get("match_delta_e_2000"),
+        "distance": row.get("match_measured_distance"),
+        "misfit": row.get("misfit_over_noise"),
+    }
+    said = {name: row.get(name, "") for name in rows.CARDS}
+    return {"name": job.path.name, "swatch": row.get(rows.SWATCH)} | said | levels | numbers
 
 
 def _lost(found: Sequence[Mapping[str, Any]]) -> bool:
@@ -169,7 +190,7 @@ def _kept(target: Path, waiting: Mapping[str, Any]) -> Iterator[tuple[str, list[
 def _table(every: Sequence[Job], done: Mapping[int, list[dict[str, Any]]]) -> pl.DataFrame:
     """One row for each file and model, the columns in the order in which they first appear."""
     flat = [{"file": os.fspath(job.path)} | row for k, job in enumerate(every) for row in done[k]]
-    names = list(dict.fromkeys(name for row in flat for name in row))
+    names = [name for name in dict.fromkeys(name for row in flat for name in row) if name != rows.SWATCH]
     columns = {name: [_storable(row.get(name)) for row in flat] for name in names}
     try:
         return pl.DataFrame({name: pl.Series(name, column, strict=False) for name, column in columns.items()})

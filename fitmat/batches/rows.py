@@ -10,10 +10,16 @@ import numpy as np
 
 from fitmat.errors import FitmatError
 from fitmat.match.match import Match
+from fitmat.studies import record
+from fitmat.studies.cards import best, cards
 from fitmat.studies.findings import Findings
 from fitmat.studies.study import Study
+from fitmat.studies.swatches import swatch
 from fitmat.text import plain
 from fitmat.uncertainty.estimate import Estimate
+
+CARDS, SWATCH = ("material", "phong", "trust"), "swatch"
+"""Columns of the sentences, and what the table leaves to the page."""
 
 REFUSED, FAILED = "refused", "failed"
 """Outcomes of a file that could not be read or fitted, and of one that fitmat stumbled over; `message` says why."""
@@ -21,7 +27,7 @@ REFUSED, FAILED = "refused", "failed"
 
 def rows(study: Study) -> list[dict[str, Any]]:
     """One row for each model of a study, JSON types only."""
-    best = None if study.choice is None else study.choice.candidates[0].name
+    named = None if study.choice is None else study.choice.candidates[0].name
     shared = {
         "outcome": "",
         "message": "",
@@ -32,10 +38,23 @@ def rows(study: Study) -> list[dict[str, Any]]:
         "warnings": " ".join(study.warnings),
     }
     match = {} if study.match is None else dict(_match(study.match))
+    said = _cards(study)
     return [
-        plain(shared | {"model": found.name, "best": best is None or found.name == best} | _one(found) | match)
+        plain(shared | {"model": found.name, "best": named is None or found.name == named} | said | _one(found) | match)
         for found in study.findings
     ]
+
+
+def _cards(study: Study) -> dict[str, Any]:
+    """The three sentences that a page begins with, their levels, and the sphere beside them."""
+    told = record.to_dict(study)
+    found = {}
+    for name, card in zip(CARDS, cards(told), strict=True):
+        found |= {name: card.sentence, f"{name}_level": card.level}
+    first = best(told)
+    of = next((f for f in study.findings if first is not None and f.name == first["model"]), None)
+    shown = None if of is None else swatch(of.fit.model, study.measurements.channels)
+    return found | {SWATCH: shown}
 
 
 def refused(error: FitmatError) -> list[dict[str, Any]]:

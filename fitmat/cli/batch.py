@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from fitmat.batches.batch import Batch, batch
+from fitmat.batches.batch import PAGE, Batch, batch
 from fitmat.cli import interrupts, process, session
 from fitmat.text import visible
 
@@ -80,4 +80,4 @@ def show(found: Batch, screen: Console | None = None) -> None:
         out.print(Text(visible(words)), soft_wrap=plain)
     if len(lost) > MOST:
         out.print(Text(f"and {len(lost) - MOST} more: outcome and message in the table.", "dim"), soft_wrap=plain)
-    process.say(f"\nTable: {found.file}")
+    process.say(f"\nTable: {found.file}\nPage: {found.file.with_name(PAGE)}")

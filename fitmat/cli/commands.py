@@ -17,6 +17,7 @@ from fitmat.cli.flags.files import (
     DesignPlotFlag,
     ForceFlag,
     JsonFlag,
+    OpenFlag,
     OutFlag,
     PlotFlag,
     ReplaceFlag,
@@ -74,6 +75,7 @@ def fit(
     out: OutFlag = None,
     force: ForceFlag = False,
     json_: JsonFlag = False,
+    open_: OpenFlag = False,
     no_mcmc: NoMcmcFlag = False,
     seed: SeedFlag = 0,
     fix: FixFlag = None,
@@ -100,6 +102,8 @@ def fit(
             told |= {"sampling": not no_mcmc, "second_opinion": check_posterior, "full": full}
             done = fit.write_report(files, out, reading | {"instrument": instrument}, told, watch, force=force)
     done.tell(as_json=json_)
+    if open_:
+        done.open()
     if not done.converged:
         raise typer.Exit(NOT_CONVERGED)
 

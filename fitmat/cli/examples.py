@@ -40,9 +40,9 @@ DESIGN = (
 )
 
 BATCH = (
-    "Written to --out: results.parquet, one row for each file and model with every parameter, its interval, the "
-    "doubts and the match; a file that cannot be used is a row with its sentence. Interrupted or killed, the same "
-    "command goes on; a file that changed is done again.\n\n"
+    "Written to --out: index.html, a line for each file; results.parquet, one row for each file and model with every "
+    "parameter, its interval, the doubts and the match. A file that cannot be used is a row with its sentence. "
+    "Interrupted or killed, the same command goes on; a file that changed is done again.\n\n"
     "Examples:\n\n  fitmat batch scans --out results\n\n"
     "  fitmat batch 'scans/*.csv' --models lambert+ggx --fix ks=1\n\n"
     "  fitmat batch --jobs jobs.csv"

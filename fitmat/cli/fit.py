@@ -54,6 +54,14 @@ class Report(NamedTuple):
         if (kept := program_files.kept()).why:
             process.say(kept.words, err=True)
 
+    def open(self) -> None:
+        """Open the page in a browser; say so where there is none."""
+        import webbrowser
+
+        shown = (self.folder / page.PAGE).resolve()
+        if shown.exists() and not webbrowser.open(shown.as_uri()):
+            process.say(f"no browser was found to open {shown} with.", err=True)
+
 
 def known(fixed: Sequence[str], believed: Sequence[str]) -> dict[str, Any]:
     """What `--fix` and `--prior` say, as `study` takes it.

@@ -15,6 +15,9 @@ from fitmat.text import brief, with_error
 UNDETERMINED = "not determined"
 """Remark on what has an interval but no value to rely on."""
 
+BOUND = " bound"
+"""How the remark ends on what sits on one: "at its lower bound"."""
+
 SEVERAL = "another optimum fits as well"
 """Remark on what has several values, which its interval holds, and none to rely on."""
 

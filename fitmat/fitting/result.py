@@ -18,7 +18,7 @@ from fitmat.fitting.information import FOLLOWS, MISSES, inverse_information
 from fitmat.fitting.likelihood import Data
 from fitmat.fitting.linear import Linear, linearise
 from fitmat.fitting.losses import Loss
-from fitmat.fitting.quantities import SEVERAL, UNDETERMINED, Quantity, dataframe, named
+from fitmat.fitting.quantities import BOUND, SEVERAL, UNDETERMINED, Quantity, dataframe, named
 from fitmat.maths.normal import Z95
 from fitmat.measurements.noise import Noise
 from fitmat.measurements.samples import Measurements
@@ -297,5 +297,5 @@ def _remark(fit: Fit, entry: Entry, name: str, undetermined: Collection[str]) ->
     if name in fit.elsewhere:
         return SEVERAL
     if entry.name in fit.on_bound:
-        return f"at its {fit.on_bound[entry.name]} bound"
+        return f"at its {fit.on_bound[entry.name]}{BOUND}"
     return "fixed" if entry.name in fit.held else ""

@@ -68,10 +68,10 @@ def to_html(record: Mapping[str, Any], figures: Mapping[str, Any]) -> str:
         figures: The same, of `studies.figures.to_dict`, with the ball's data.
     """
     told, drawn = visible_in(record, keep="\n"), visible_in(figures, keep="\n")
-    scripts = [*map(_static, SCRIPTS), _stage()]
-    hashes = " ".join(f"'sha256-{_digest(script)}'" for script in scripts)
+    scripts = [*map(static, SCRIPTS), _stage()]
+    hashes = " ".join(f"'sha256-{digest(script)}'" for script in scripts)
     return (
-        _environment()
+        environment()
         .get_template("report.html")
         .render(
             record=told,
@@ -81,8 +81,8 @@ def to_html(record: Mapping[str, Any], figures: Mapping[str, Any]) -> str:
             fits=ordered(told),
             policy=POLICY.format(hashes),
             scripts=[Markup(script) for script in scripts],
-            styles=[Markup(_static(name)) for name in STYLES],
-            licence=Markup(_static(LICENCE)),
+            styles=[Markup(static(name)) for name in STYLES],
+            licence=Markup(static(LICENCE)),
             data=Markup(_embedded({"record": _rounded(_used(told)), "figures": drawn})),
             swatch=figures["swatches"],
             **_WORDS,
@@ -109,7 +109,8 @@ _WORDS = {
 
 
 @functools.cache
-def _environment() -> jinja2.Environment:
+def environment() -> jinja2.Environment:
+    """What renders templates: autoescaped, strict, with the words and drawings of all pages."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("fitmat.reports"),
         autoescape=True,
@@ -139,25 +140,27 @@ def _environment() -> jinja2.Environment:
 
 def load() -> None:
     """Load what pages are made with."""
-    for name in _environment().list_templates():
-        _environment().get_template(name)
+    for name in environment().list_templates():
+        environment().get_template(name)
     for name in (*SCRIPTS, *STYLES, LICENCE):
-        _static(name)
+        static(name)
     _stage()
 
 
 @functools.cache
-def _static(name: str) -> str:
+def static(name: str) -> str:
+    """A script or a style that comes with fitmat."""
     return files("fitmat.reports").joinpath("static", name).read_text(encoding="utf-8")
 
 
 @functools.cache
 def _stage() -> str:
     """What draws the ball and the lobes, in a scope of its own."""
-    return f"(() => {{\n{ball.script()}\n{_static('stage.js')}}})();\n"
+    return f"(() => {{\n{ball.script()}\n{static('stage.js')}}})();\n"
 
 
-def _digest(script: str) -> str:
+def digest(script: str) -> str:
+    """SHA-256 as a policy names the scripts that may run."""
     return base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
 

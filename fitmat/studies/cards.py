@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fitmat.fitting.quantities import UNDETERMINED
+from fitmat.fitting.quantities import BOUND, UNDETERMINED
 from fitmat.match.appearance.spheres import CLEARLY_VISIBLE, JUST_NOTICEABLE
 from fitmat.match.distances import WITHIN
 from fitmat.match.regions import GRAZING_DEG
@@ -120,7 +120,9 @@ def _material(record: Record) -> Card:
 def _sure(told: Record, name: str) -> Record | None:
     """A quantity, where there is one whose value can be relied on."""
     found = told.get(name)
-    return None if found is None or UNDETERMINED in _listed(found["remark"]) else found
+    if found is None or any(remark == UNDETERMINED or BOUND in remark for remark in _listed(found["remark"])):
+        return None
+    return found
 
 
 def _percent(values: list[float]) -> str:

@@ -66,10 +66,15 @@ def test_rows_are_those_of_single_studies(scans: Path, tmp_path: Path) -> None:
             row = table.filter(pl.col("file").str.ends_with(f"/{name}"), pl.col("model") == one.name).row(0, named=True)
             assert row["outcome"] == one.fit.result
             assert row["best"] == (alone.choice is not None and alone.choice.candidates[0].name == one.name)
+            assert row["material"].startswith("Like ")
             assert row["match_distance"] == pytest.approx(alone.match.hemisphere_distance.value, rel=SAME)
             for q in one.parameters:
                 assert row[q.name] == pytest.approx(q.value[0], rel=SAME)
                 assert [row[f"{q.name}_low"], row[f"{q.name}_high"]] == pytest.approx(list(q.ci95[0]), rel=SAME)
+    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert "<h1>3 of 4 files fitted</h1>" in page
+    assert page.count('src="data:image/png;base64,') == 3
+    assert "swatch" not in table.columns
     bad = table.row(0, named=True)
     assert (bad["outcome"], bad["model"], bad["exponent"]) == ("refused", None, None)
     assert bad["message"].startswith("bad.csv")
@@ -202,7 +207,7 @@ def test_two_batches_do_not_write_to_one_folder(tmp_path: Path) -> None:
     with files.alone(out), pytest.raises(FitmatError, match=r"out is being written by another run; wait for it"):
         fm.batch(DATA / "wax.csv", out, "lambert")
     assert len(fm.batch(DATA / "wax.csv", out, "lambert").table) == 1
-    assert sorted(os.listdir(out)) == ["parts", "results.parquet"]
+    assert sorted(os.listdir(out)) == ["index.html", "parts", "results.parquet"]
 
 
 def deadly(job: Job, content: str) -> Any:

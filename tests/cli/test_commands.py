@@ -309,6 +309,17 @@ def test_the_page_of_a_run_is_made_again(run, tmp_path):
     assert_refused(run("report", out, "--force"), r"figures\.json: No such file or directory; the run is older .*")
 
 
+def test_the_page_is_opened_where_there_is_a_browser(run, tmp_path, monkeypatch):
+    asked, out = [], tmp_path / "out"
+    monkeypatch.setattr("webbrowser.open", lambda address: asked.append(address) or len(asked) > 1)
+    ended = run("fit", DATA / "sparse.csv", *QUICK, "--out", out, "--open")
+    assert (ended.code, asked) == (0, [(out / "report.html").resolve().as_uri()])
+    assert f"no browser was found to open {out / 'report.html'} with." in ended.err
+    ended = run("fit", DATA / "sparse.csv", *QUICK, "--out", out, "--force", "--open")
+    assert (ended.code, len(asked)) == (0, 2)
+    assert "browser" not in ended.err
+
+
 def test_out_is_refused_then_replaced_by_force(run, tmp_path):
     out = tmp_path / "out"
     assert run("fit", DATA / "sparse.csv", *QUICK, "--out", out).code == 0

@@ -88,6 +88,7 @@ def test_sizes_are_those_of_the_error_contrasts() -> None:
     assert [found.white, found.process[0]] == pytest.approx(np.exp(best.x), rel=0.15)
 
 
+@pytest.mark.study
 def test_each_part_has_a_size_of_its_own() -> None:
     """Beside the same density, maximised over three sizes; a part whose process hardly raises it has none."""
     rng = np.random.default_rng(4)

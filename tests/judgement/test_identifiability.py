@@ -70,6 +70,14 @@ def test_what_a_misfit_leaves_open_is_not_put_down_to_the_angles() -> None:
     assert "by these angles" not in found.words
 
 
+def test_what_sits_on_a_bound_is_not_called_determined() -> None:
+    """A surface brighter than white: kd = 1, which is all that is said of it."""
+    wo = np.deg2rad(np.arange(-60.0, 61.0, 10.0))
+    m = fm.from_arrays(np.full(13, 0.5), wo, np.full(13, 0.5), sigma=np.full(13, 0.005))
+    found = identify(fm.laplace(fm.fit(m, "lambert"), seed=1))
+    assert found.words == "kd sits on its bound."
+
+
 def test_what_is_determined_of_a_lost_pair_is_named(identified: Identifiability) -> None:
     (group,) = identified.groups
     assert set(group.names) == {"ks", "eta"}

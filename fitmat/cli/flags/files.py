@@ -48,6 +48,8 @@ ReplacePageFlag = Annotated[bool, typer.Option("--force", help="Replace the page
 
 ForceFlag = Annotated[bool, typer.Option("--force", help="Replace the report of an earlier run in --out.")]
 
+OpenFlag = Annotated[bool, typer.Option("--open", help="Open the report in a browser when it is written.")]
+
 JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else.")]
 
 PlotFlag = Annotated[

@@ -123,12 +123,20 @@ class Identifiability:
         """Plain sentences: what is determined, what is not, and what of it is known all the same."""
         if not self.verdicts:
             return f"{self.fit.name} has no free parameter to determine."
-        parts = []
+        parts, ends = [], self._bounded()
         for state, misfit, why in _WORDED:
-            names = [v.name for v in self.verdicts if (v.state, v.misfit) == (state, misfit)]
+            names = [v.name for v in self.verdicts if (v.state, v.misfit) == (state, misfit) and v.name not in ends]
             if names:
                 parts.append(f"{_listed(names)} {'is' if len(names) == 1 else 'are'} {state}{why}.")
-        return " ".join([*parts, *self._several(), *(self._traded(g) for g in self.groups)])
+        if ends:
+            ends = [f"{_listed(ends)} {'sits on its bound' if len(ends) == 1 else 'sit on their bounds'}."]
+        return " ".join([*parts, *ends, *self._several(), *(self._traded(g) for g in self.groups)])
+
+    def _bounded(self) -> list[str]:
+        """What would count as determined, and sits on a bound."""
+        moved = self.fit.coordinates
+        sides = dict(zip(moved.names, moved.side(self.fit.values).tolist(), strict=True))
+        return [v.name for v in self.verdicts if v.state != STATES[2] and sides.get(v.name, 0)]
 
     def _several(self) -> list[str]:
         """Other optima: those of other starts, and one that only a profile came upon."""
