@@ -27,8 +27,8 @@ def describe_scope(fit: Fit) -> str:
     shared = found.shared or "errors of neighbouring angles are alike"
     shared = shared[0].upper() + shared[1:]
     return (
-        f"{about} {shared}: {count:,} readings count as {_counted(found.independent)} independent ones, and the "
-        f"intervals are up to {np.sqrt(found.inflation.max()):.2g} times wider for that."
+        f"{about} {shared}: {count:,} readings count as {_counted(found.independent)} independent ones. The intervals "
+        f"allow for that: they are up to {np.sqrt(found.inflation.max()):.2g} times wider."
     )
 
 

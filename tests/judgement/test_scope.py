@@ -39,8 +39,8 @@ def test_alike_misfits_are_counted(made: fm.Measurements) -> None:
     shared = found.shared[0].upper() + found.shared[1:]
     wider = f"{np.sqrt(found.inflation.max()):.2g}"
     assert describe_scope(wrong) == (
-        f"{ABOUT} {shared}: 324 readings count as {counted} independent ones, and the "
-        f"intervals are up to {wider} times wider for that."
+        f"{ABOUT} {shared}: 324 readings count as {counted} independent ones. The intervals "
+        f"allow for that: they are up to {wider} times wider."
     )
 
 
