@@ -263,9 +263,12 @@ def _trust(record: Record) -> Card:
         return Card(question, CAUTION, "with care", f"With care: {misses}; the intervals allow for that.")
     if lost:
         few = ", ".join(lost[:3]) + (f" and {len(lost) - 3} more" if len(lost) > 3 else "")
-        verb = "is" if len(lost) == 1 else "are"
-        words = f"In part: {few} {verb} not determined by these angles; `fitmat design` says what to measure next."
-        return Card(question, CAUTION, "in part", words)
+        verb, states = "is" if len(lost) == 1 else "are", (fit["identifiability"] or {"parameters": {}})["parameters"]
+        why = " by these angles; `fitmat design` says what to measure next"
+        open_ = [state for state in states.values() if state["state"] == UNDETERMINED]
+        if open_ and all(state.get("misfit") for state in open_):
+            why = ", because the model misses the data; another model may say more"
+        return Card(question, CAUTION, "in part", f"In part: {few} {verb} not determined{why}.")
     if fit["adequacy"].startswith("adequacy unknown"):
         words = "Not known: nobody stated the noise, so whether the model is adequate cannot be judged."
         return Card(question, UNKNOWN, "not known", words)

@@ -120,6 +120,7 @@ def _identified_dict(found: Identifiability) -> dict[str, Any]:
     states = {
         v.name: {
             "state": v.state,
+            "misfit": v.misfit,
             "value": v.value,
             "ci95": list(v.ci95),
             "open": list(v.open),

@@ -161,6 +161,14 @@ def test_phong_serves_where_the_data_prefer_it() -> None:
         ({"inadequate": True, "intervals_hold": False, "doubts": ["a"]}, BAD, "No: "),
         ({"not_determined": ["eta", "ks"]}, CAUTION, "In part: eta, ks are not determined by these angles; `"),
         ({"not_determined": ["eta"]}, CAUTION, "In part: eta is not"),
+        (
+            {
+                "not_determined": ["eta"],
+                "identifiability": {"parameters": {"eta": {"state": "not determined", "misfit": True}}},
+            },
+            CAUTION,
+            "In part: eta is not determined, because the model misses the data; another model may say more.",
+        ),
         ({"not_determined": list("abcdefgh")}, CAUTION, "In part: a, b, c and 5 more are not determined"),
         ({"adequacy": "adequacy unknown: the noise is not known"}, UNKNOWN, "Not known: "),
         (
