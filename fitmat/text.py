@@ -52,6 +52,13 @@ def visible_in(thing: Any, *, keep: str = "") -> Any:
     return [visible_in(part, keep=keep) for part in thing] if isinstance(thing, list | tuple) else thing
 
 
+def channel_labels(name: str, count: int, channels: Sequence[str], *, own: bool) -> list[str]:
+    """The name of each of `count` values on one line, with its channel where there are several and each has its own."""
+    if not own or len(channels) < 2:
+        return [name] * count
+    return [f"{name} {visible(channel)}" for channel in channels]
+
+
 def for_shell(path: str | os.PathLike[str]) -> str:
     """A path as a command line takes it, quoted where it must be."""
     return visible(shlex.quote(os.fspath(path)))

@@ -127,18 +127,19 @@ def _studied(every: Sequence[Job], target: Path, processes: int, say: Progress) 
     for key, found in earlier.items():
         del waiting[key]
         done |= dict.fromkeys(keys[key], found)
-    _tell(say, done, len(every))
+    lost = sum(_lost(found) for found in done.values())
+    _tell(say, done, lost, len(every))
     for key, found in workers.each(waiting, processes):
         if not any(row["outcome"] == rows.FAILED for row in found):
             files.write_text(target / PARTS / f"{key}.json", json.dumps(found))
         done |= dict.fromkeys(keys[key], found)
-        _tell(say, done, len(every))
+        lost += len(keys[key]) * _lost(found)
+        _tell(say, done, lost, len(every))
     table = _table(every, done)
     memory = io.BytesIO()
     table.write_parquet(memory)
     file = files.write_bytes(target / TABLE, memory.getvalue())
     files.write_text(target / PAGE, _page(every, done))
-    lost = sum(_lost(found) for found in done.values())
     before = sum(len(keys[key]) for key in earlier)
     return Batch(file, table, {"fitted": len(every) - lost, "refused": lost, "earlier": before})
 
@@ -171,8 +172,7 @@ def _lost(found: Sequence[Mapping[str, Any]]) -> bool:
     return found[0]["outcome"] in (rows.REFUSED, rows.FAILED)
 
 
-def _tell(say: Progress, done: Mapping[int, Any], total: int) -> None:
-    lost = sum(_lost(found) for found in done.values())
+def _tell(say: Progress, done: Mapping[int, Any], lost: int, total: int) -> None:
     say(f"fitting {total} files{f', {lost} refused' if lost else ''}", len(done), total)
 
 

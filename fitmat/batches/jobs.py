@@ -17,6 +17,7 @@ import polars as pl
 
 from fitmat.errors import ReadError
 from fitmat.fitting import priors
+from fitmat.measurements.parsing.constants import CONSTANTS
 from fitmat.models.parameters import assignments
 
 FILE = "file"
@@ -27,9 +28,6 @@ READING = (
     *("unknown_scale", "scale"),
 )
 """Columns that are arguments of `fitmat.read`."""
-
-CONSTANTS = ("theta_i", "theta_o", "phi", "phi_i", "phi_o", "wavelength")
-"""Columns that are the same in every row of a file."""
 
 STUDYING = ("models", "loss", "masking", "ior", "tilt", "seed")
 """Columns that are arguments of `fitmat.study`."""

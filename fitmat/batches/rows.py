@@ -81,8 +81,7 @@ def _one(found: Findings) -> dict[str, Any]:
         "bic": fit.bic,
     }
     for q in (*found.parameters, *found.derived):
-        for k in range(len(q.value)):
-            name = f"{q.name} {fit.measurements.channels[k]}" if q.per_channel and len(q.value) > 1 else q.name
+        for k, name in enumerate(q.labels(fit.measurements.channels)):
             low, high = q.ci95[k]
             told |= {name: q.value[k], f"{name}_sd": q.sd[k], f"{name}_low": low, f"{name}_high": high}
             told |= {f"{name}_remark": q.remarks[k]}

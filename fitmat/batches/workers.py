@@ -3,6 +3,7 @@
 They are spawned, never forked: JAX has threads. Files whose worker dies are tried again, each alone.
 """
 
+import contextlib
 import multiprocessing
 import os
 import signal
@@ -59,16 +60,29 @@ def each(jobs: Mapping[str, tuple[Job, str]], count: int, work: Work = studied) 
         work: What each does.
     """
     left = dict(jobs)
-    while left:
-        suspects: Sequence[str] = ()
-        try:
-            for key, found in _side_by_side(left, count, work):
-                del left[key]
-                yield key, found
-        except _DiedError as died:
-            suspects = died.keys
-        for key in suspects:
-            yield key, _alone(left.pop(key), work)
+    with _one_thread():
+        while left:
+            suspects: Sequence[str] = ()
+            try:
+                for key, found in _side_by_side(left, count, work):
+                    del left[key]
+                    yield key, found
+            except _DiedError as died:
+                suspects = died.keys
+            for key in suspects:
+                yield key, _alone(left.pop(key), work)
+
+
+@contextlib.contextmanager
+def _one_thread() -> Iterator[None]:
+    """`ONE_THREAD` for the workers to inherit, but for what the user's environment says already; then as it was."""
+    added = {name: value for name, value in ONE_THREAD.items() if name not in os.environ}
+    os.environ.update(added)
+    try:
+        yield
+    finally:
+        for name in added:
+            os.environ.pop(name, None)
 
 
 class _DiedError(Exception):
@@ -113,9 +127,6 @@ def _alone(told: tuple[Job, str], work: Work) -> Rows:
 
 
 def _pool(count: int) -> ProcessPoolExecutor:
-    """Workers that inherit `ONE_THREAD`, but for what the user's environment says already."""
-    for name, value in ONE_THREAD.items():
-        os.environ.setdefault(name, value)
     return ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _begin)
 
 

@@ -8,6 +8,7 @@ import json
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -39,6 +40,46 @@ AZIMUTHS = 12
 READER, LOOKUP = "fitmat's own reader", "the nearest cell, as BRDFRead.cpp does,"
 
 
+class Grid(NamedTuple):
+    """Angles of a goniometer, radians.
+
+    Attributes:
+        step: Between two of them.
+        zenith: From 0 to below π/2, (n,).
+        light: Zenith angles of incidence, (k,).
+        azimuth: From 0 to π, of an anisotropic material all the way round, (m,).
+        turns: Azimuths of incidence: 0, of an anisotropic material through half a turn, (r,).
+    """
+
+    step: float
+    zenith: Float[np.ndarray, " n"]
+    light: Float[np.ndarray, "..."]
+    azimuth: Float[np.ndarray, " m"]
+    turns: Float[np.ndarray, " r"]
+
+
+def grid(chosen: Chosen, theta_i: ArrayLike | None, step: float | None) -> Grid:
+    """The angles at which a material is written down.
+
+    Args:
+        chosen: What is exported.
+        theta_i: Zenith angles of incidence in radians; None for every zenith angle.
+        step: In radians; None for 5°, or 15° of an anisotropic material.
+
+    Raises:
+        FitmatError: an angle or the step is out of range.
+    """
+    isotropic = chosen.model.isotropic
+    if step is None:
+        step = float(np.deg2rad(STEP_DEG if isotropic else WIDE_STEP_DEG))
+    arguments.numbers("step", step, FINEST, COARSEST, of=" radians; 0.1 to 45 degrees", single=True)
+    zenith = np.arange(0.0, np.pi / 2 - 1e-9, step)
+    light = zenith if theta_i is None else np.atleast_1d(arguments.angles("theta_i", theta_i, arguments.ZENITH))
+    across = np.linspace(0.0, np.pi, max(round(np.pi / step), 1) + 1)
+    azimuth = across if isotropic else np.concatenate([across, np.pi + across[1:-1]])
+    return Grid(step, zenith, light, azimuth, across[:1] if isotropic else across[:-1])
+
+
 def measured(chosen: Chosen, theta_i: ArrayLike | None = None, step: float | None = None) -> Measurements:
     """The material at every combination of angles.
 
@@ -53,15 +94,7 @@ def measured(chosen: Chosen, theta_i: ArrayLike | None = None, step: float | Non
     Raises:
         FitmatError: an angle or the step is out of range, or there would be more than `MOST_ROWS` rows.
     """
-    isotropic = chosen.model.isotropic
-    if step is None:
-        step = float(np.deg2rad(STEP_DEG if isotropic else WIDE_STEP_DEG))
-    arguments.numbers("step", step, FINEST, COARSEST, of=" radians; 0.1 to 45 degrees", single=True)
-    seen = np.arange(0.0, np.pi / 2 - 1e-9, step)
-    light = seen if theta_i is None else np.atleast_1d(arguments.angles("theta_i", theta_i, arguments.ZENITH))
-    across = np.linspace(0.0, np.pi, max(round(np.pi / step), 1) + 1)
-    phi = across if isotropic else np.concatenate([across, np.pi + across[1:-1]])
-    turns = across[:1] if isotropic else across[:-1]
+    step, seen, light, phi, turns = grid(chosen, theta_i, step)
     rows = len(light) * len(seen) * len(phi) * len(turns)
     if light.ndim != 1 or not 0 < rows <= MOST_ROWS:
         raise ModelError(

@@ -11,9 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fitmat import arguments
 from fitmat.exports.material import Chosen
-from fitmat.exports.table import COARSEST, FINEST, READER, STEP_DEG, WIDE_STEP_DEG
+from fitmat.exports.table import READER, grid
 from fitmat.exports.verification import Difference, compared, exact
 from fitmat.maths.directions import from_angles
 from fitmat.measurements.formats import zemax
@@ -39,15 +38,7 @@ def translated(chosen: Chosen, theta_i: ArrayLike | None = None, step: float | N
     Raises:
         FitmatError: an angle or the step is out of range.
     """
-    isotropic = chosen.model.isotropic
-    if step is None:
-        step = float(np.deg2rad(STEP_DEG if isotropic else WIDE_STEP_DEG))
-    arguments.numbers("step", step, FINEST, COARSEST, of=" radians; 0.1 to 45 degrees", single=True)
-    whole = np.arange(0.0, np.pi / 2 - 1e-9, step)
-    light = whole if theta_i is None else np.atleast_1d(arguments.angles("theta_i", theta_i, arguments.ZENITH))
-    across = np.linspace(0.0, np.pi, max(round(np.pi / step), 1) + 1)
-    azimuth = across if isotropic else np.concatenate([across, np.pi + across[1:-1]])
-    turns = across[:1] if isotropic else across[:-1]
+    step, _, light, azimuth, turns = grid(chosen, theta_i, step)
     radial = np.concatenate([[0.0], step * np.array(FINER), np.arange(step, np.pi - 1e-9, step)])
     turn, incidence, around, away = np.meshgrid(turns, light, azimuth, radial, indexing="ij")
     wo = blocks.around(incidence, turn, away, around).reshape(-1, 3)

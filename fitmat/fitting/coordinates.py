@@ -20,7 +20,7 @@ from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, AbstractEstimated
 from fitmat.models.estimated import unfitted
 from fitmat.models.parameters import Entry, entries, with_vector
-from fitmat.text import visible
+from fitmat.text import channel_labels
 
 M = TypeVar("M", bound=eqx.Module)
 Numbers = TypeVar("Numbers", np.ndarray, Array)
@@ -214,6 +214,4 @@ def coordinates(
 
 def channel_names(entry: Entry, channels: tuple[str, ...]) -> list[str]:
     """The name of each value of a parameter, on one line: "kd r", "kd g", or "alpha" where all channels share it."""
-    if not entry.shape or len(channels) < 2:
-        return [entry.name] * entry.size
-    return [f"{entry.name} {visible(channel)}" for channel in channels]
+    return channel_labels(entry.name, entry.size, channels, own=bool(entry.shape))

@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 
 from fitmat.errors import ModelError
-from fitmat.text import brief, with_error
+from fitmat.text import brief, channel_labels, with_error
 
 UNDETERMINED = "not determined"
 """Remark on what has an interval but no value to rely on."""
@@ -54,6 +54,10 @@ class Quantity:
         """The name, each value with its standard deviation and 95 % interval, or why there is none."""
         told = (self._entry(k) for k in range(len(self.value)))
         return f"{self.name} ({self.symbol}) = {'; '.join(told)}{'' if self.unit == '1' else ' ' + self.unit}"
+
+    def labels(self, channels: Sequence[str]) -> list[str]:
+        """The name of each value, on one line: "kd r", "kd g", or "alpha" where all channels share it."""
+        return channel_labels(self.name, len(self.value), channels, own=self.per_channel)
 
     def _entry(self, k: int) -> str:
         found, (low, high), remark = with_error(float(self.value[k]), float(self.sd[k])), self.ci95[k], self.remarks[k]

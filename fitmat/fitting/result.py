@@ -208,9 +208,9 @@ class Fit:
         return dataframe(self.parameters, self.name, self.measurements.channels)
 
     def _rows(self) -> list[tuple[str, str, str]]:
-        names = iter(coordinates(self.model, channels=self.measurements.channels).names)
-        each = ((q.symbol, q.value[k], q.sd[k]) for q in self.parameters for k in range(len(q.value)))
-        return [(next(names), symbol, with_error(float(value), float(sd))) for symbol, value, sd in each]
+        channels = self.measurements.channels
+        each = ((label, q, k) for q in self.parameters for k, label in enumerate(q.labels(channels)))
+        return [(label, q.symbol, with_error(float(q.value[k]), float(q.sd[k]))) for label, q, k in each]
 
     def __str__(self) -> str:
         """The outcome and every parameter with its standard deviation."""
@@ -246,8 +246,7 @@ def by_curvature(fit: Fit) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, "
     Both are NaN where the loss is an objective.
     """
     every, v = coordinates(fit.model), fit.values
-    sd = np.sqrt(np.diagonal(fit.covariance))
-    sd = sd if fit.loss.posterior else np.full_like(sd, np.nan)
+    sd = np.sqrt(np.diagonal(fit.covariance)) if fit.loss.posterior else np.full(len(v), np.nan)
     with np.errstate(over="ignore"):
         ratio = np.exp(Z95 * sd / every.slope(v))
         low = np.where(every.ratio, v / ratio, v - Z95 * sd)

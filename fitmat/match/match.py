@@ -19,6 +19,7 @@ from fitmat.match.appearance.spheres import Perceived, perceived
 from fitmat.match.discernibility import Telling, tell_apart
 from fitmat.match.distances import ANGLES, Distances, PairedDraws, measure_distances
 from fitmat.match.imitation import Imitation, imitate
+from fitmat.match.pairing import paired_draws
 from fitmat.match.sentences import CLOSE as CLOSE
 from fitmat.match.sentences import SIMILAR as SIMILAR
 from fitmat.match.sentences import STRONG_EVIDENCE as STRONG_EVIDENCE
@@ -29,9 +30,6 @@ from fitmat.text import brief
 from fitmat.uncertainty.estimate import Estimate, band, estimate
 from fitmat.uncertainty.laplace import laplace
 from fitmat.uncertainty.posterior import Posterior
-
-MATCH_DRAWS = 100
-"""Posterior draws behind every interval of the match."""
 
 FEW_DRAWS = 50
 """Draws behind the intervals of what is costlier: ablation and the predictive difference."""
@@ -280,20 +278,6 @@ def _concluded(pair: tuple[Posterior, Posterior], found: Distances, **parts: Any
 
 def _perceived(empirical: Fit, microfacet: Fit, draws: PairedDraws, pictures: bool) -> Perceived:
     return perceived(empirical.model, microfacet.model, draws, empirical.measurements.channels, pictures=pictures)
-
-
-def paired_draws(empirical: Posterior, microfacet: Posterior) -> PairedDraws:
-    """Parameter vectors of both: the best fits, then draws in pairs, in no particular order."""
-    one, other = _by_scale(empirical), _by_scale(microfacet)
-    mixed = np.random.default_rng(0).permutation(min(len(one), len(other)))
-    return np.vstack([empirical.fit.values, one[mixed]]), np.vstack([microfacet.fit.values, other[mixed]])
-
-
-def _by_scale(posterior: Posterior) -> np.ndarray:
-    """Draws in the order of the shared scale, which has one true value for both models; else as they come."""
-    values = posterior.thinned(MATCH_DRAWS)[0]
-    place = next((e.place for e in posterior.fit.entries if e.name == "scale"), None)
-    return values if place is None else values[np.argsort(values[:, place.start])]
 
 
 def _draws_of(posterior: Posterior, name: str) -> np.ndarray | None:

@@ -14,30 +14,27 @@ from jaxtyping import ArrayLike
 
 from fitmat import arguments
 from fitmat._types import Progress
-from fitmat.errors import ModelError
 from fitmat.fitting.losses import DEFAULT
-from fitmat.fitting.streamed import fit_from, fit_part, rows
 from fitmat.judgement.budget import Line, of_draws
 from fitmat.judgement.choice import Choice, choose
 from fitmat.judgement.examination.examining import warnings
 from fitmat.judgement.identifiability.verdicts import Identifiability, identify
 from fitmat.judgement.prediction import sections
 from fitmat.judgement.predictive_check import PredictiveCheck, check_predictions
-from fitmat.match.match import Match, compare, is_empirical, is_microfacet, paired_draws
-from fitmat.measurements.large.stream import Stream, hold
+from fitmat.match.match import Match, compare, is_empirical, is_microfacet
+from fitmat.match.pairing import paired_draws
+from fitmat.measurements.large.stream import Stream
 from fitmat.measurements.reader import measurements_of
 from fitmat.measurements.samples import Measurements
 from fitmat.models.around.tilt import Tilted
 from fitmat.studies.findings import Findings, find
-from fitmat.studies.plan import DEFAULT_MODELS, Jobs, plan, refuse_unsampled
+from fitmat.studies.large import as_stream, counted, pass_over
+from fitmat.studies.plan import DEFAULT_MODELS, plan, refuse_unsampled
 from fitmat.studies.sampling import sample_each
 from fitmat.text import brief
 from fitmat.uncertainty import second_sampler
-from fitmat.uncertainty.laplace import laplace, laplace_each
+from fitmat.uncertainty.laplace import laplace_each
 from fitmat.uncertainty.posterior import Posterior
-
-MOST_AT_ONCE = 100_000
-"""Rows above which a fit passes over the data block by block."""
 
 MOST_SAMPLED = 50_000
 """Values above which nothing is sampled: a step takes seconds, and Laplace's approximation is as good."""
@@ -125,8 +122,8 @@ def study(
     """Fit models, sample their posteriors, match them and judge them: what `fitmat fit` does with a file.
 
     Args:
-        measurements: From `fitmat.read`, or a file that needs no options; more than `MOST_AT_ONCE` rows are passed
-            over block by block.
+        measurements: From `fitmat.read`, or a file that needs no options; of more than `large.MOST_AT_ONCE` rows it is
+            passed over block by block.
         models: Names, or a text with commas between them; "all" for every model that makes sense.
         fixed: Parameters to hold, by name, in every model that has them: `{"ks": 1.0}`.
         priors: What is known beforehand, by name: centre and standard deviation, `{"eta": (1.5, 0.05)}`.
@@ -165,51 +162,18 @@ def study(
     if second_opinion:
         refuse_unsampled(given.n_valid, MOST_SAMPLED, loss, sampling=sampling)
         second_sampler.require()
-    stream = _as_stream(given)
+    stream = as_stream(given)
     shown = stream if isinstance(stream, Measurements) else stream.part
     known = {"fixed": fixed, "priors": priors, "loss": loss, "masking": masking, "ior": ior, "tilt": tilt}
     jobs = plan(models, shown, **known)
     if isinstance(stream, Measurements):
         first = laplace_each(stream, jobs, seed=seed, corrected=not sampling, progress=say)
     else:
-        first = _pass_over(stream, jobs, seed, say)
+        first = pass_over(stream, jobs, seed, say)
     walking = sampling and first[0].fit.loss.posterior and first[0].fit.n_values <= MOST_SAMPLED
     posteriors = sample_each(first, seed=seed, resume=resume, progress=say) if walking else first
     found = judge(posteriors, seed=seed, second_opinion=second_opinion, full=full, progress=say)
-    return found if stream is shown else dataclasses.replace(found, rows=_counted(given))
-
-
-def _counted(given: Measurements | Stream) -> tuple[int, int]:
-    """Rows, and those in which something is masked; of a file read in parts, as often as a reason was found."""
-    if isinstance(given, Measurements):
-        return given.n_samples, given.n_masked
-    return given.n_samples, min(sum(given.part.masked.values()), given.n_samples)
-
-
-def _as_stream(measurements: Measurements | Stream) -> Measurements | Stream:
-    if isinstance(measurements, Measurements) and measurements.n_samples > MOST_AT_ONCE:
-        return hold(measurements)
-    return measurements
-
-
-def _pass_over(stream: Stream, jobs: Jobs, seed: int, say: Progress) -> list[Posterior]:
-    """Every model fitted to more rows than are taken at once."""
-    loss = next(iter(jobs.values()))["loss"]
-    if loss != DEFAULT.name:
-        raise ModelError(f"--loss {loss}: more than {MOST_AT_ONCE:,} rows are fitted under the default loss only.")
-    found = []
-    every = rows(stream, lambda step, done, total: say(f"reading: {step}", done, total))
-    say(f"fitting {', '.join(jobs)}: a part of the rows", 0, 0)
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        told = [{key: value for key, value in job.items() if key != "loss"} for job in jobs.values()]
-        starts = list(pool.map(lambda name, job: fit_part(every, name, **job), jobs, told))
-    for name, start in zip(jobs, starts, strict=True):
-
-        def passing(step: str, done: int, total: int, name: str = name) -> None:
-            say(f"fitting {name}: {step}", done, total)
-
-        found.append(laplace(fit_from(every, start, passing), seed=seed))
-    return found
+    return found if stream is shown else dataclasses.replace(found, rows=counted(given))
 
 
 def judge(

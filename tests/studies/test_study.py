@@ -81,7 +81,7 @@ def test_every_row_is_reported_where_some_are_shown(
     valid = measurements.valid.copy()
     valid[[5, 20, 21]] = False
     given = dataclasses.replace(measurements, valid=valid, source="gold.csv")
-    monkeypatch.setattr(room, "MOST_AT_ONCE", 40)
+    monkeypatch.setattr("fitmat.studies.large.MOST_AT_ONCE", 40)
     monkeypatch.setattr("fitmat.measurements.large.stream.PART", 12)
     found = study(given, "lambert", sampling=False)
     assert found.measurements.n_samples < 20
