@@ -11,10 +11,11 @@ import jax
 import numpy as np
 from jaxtyping import Float
 
+from fitmat.colour.channels import colouring
+from fitmat.colour.spaces import FROM_SRGB
 from fitmat.errors import ModelError
 from fitmat.exports.translation import COLOURS, Parametrised, parametrised
 from fitmat.match.appearance import scene
-from fitmat.match.appearance.colour import FROM_SRGB, colouring
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import Entry, Param, entries, vector, with_vector
 from fitmat.models.values import surfaces

@@ -14,12 +14,13 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat import arguments
+from fitmat.colour.channels import colouring
+from fitmat.colour.spaces import FROM_SRGB, to_srgb
 from fitmat.errors import ModelError, OutputError
 from fitmat.exports.material import Material, chosen
 from fitmat.extras import needed
 from fitmat.files import write_bytes
 from fitmat.match.appearance import scene, spheres
-from fitmat.match.appearance.colour import FROM_SRGB, colouring, to_srgb
 from fitmat.match.appearance.scene import Raster
 from fitmat.measurements.samples import default_channels
 from fitmat.models.base import AbstractBRDF, AbstractEstimated, Sum

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from fitmat.match.appearance.colour import colouring, to_srgb
+from fitmat.colour.channels import colouring
+from fitmat.colour.spaces import to_srgb
 from fitmat.match.appearance.spheres import Perceived
 from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF

@@ -13,8 +13,10 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
+from fitmat.colour.channels import colouring
+from fitmat.colour.differences import delta_e_2000, delta_e_itp
+from fitmat.colour.spaces import shown, to_srgb
 from fitmat.match.appearance import scene
-from fitmat.match.appearance.colour import colouring, delta_e_2000, delta_e_itp, shown, to_srgb
 from fitmat.match.appearance.scene import Raster, Screen
 from fitmat.match.distances import PairedDraws
 from fitmat.maths.directions import zenith
@@ -67,7 +69,7 @@ class Lighting:
         name: Of the light.
         exposure: Factor from radiance (irradiance 1 on a surface that faces the light; sky zenith 1) to display.
         delta_e_2000: CIEDE2000 of what an sRGB display shows, which clips what is brighter than white.
-        delta_e_itp: ΔE_ITP with white at `colour.WHITE_LUMINANCE`, highlights up to 10,000 cd/m².
+        delta_e_itp: ΔE_ITP with white at `differences.WHITE_LUMINANCE`, highlights up to 10,000 cd/m².
         pictures: Of the best fits; None where they were not asked for.
     """
 

@@ -1,22 +1,15 @@
-"""Colours and their differences against published numbers, the formulas of the standards, and colour-science."""
+"""Differences of colours against published numbers, the formulas of the standards, and colour-science."""
 
-import importlib
-import subprocess
-import sys
-import warnings
 from types import ModuleType
 
 import numpy as np
 import pytest
 
-from fitmat.match.appearance import colour, differences
-from fitmat.match.appearance.colour import colouring, delta_e_2000, delta_e_itp
+from fitmat.colour import differences
+from fitmat.colour.differences import delta_e_2000, delta_e_itp
 
 PRINTED = 5e-5
 """ΔE2000; Sharma's table has four digits after the point."""
-
-ROUNDED = 2e-4
-"""XYZ and chromaticities; sRGB's matrix has four digits, CIE's white point five."""
 
 ROUNDING = 1e-9
 """Differences, absolute: the power of 78.8 in the perceptual quantiser takes five digits."""
@@ -57,14 +50,6 @@ JUMPS = np.array([[50, 2.49, -0.001, 50, -2.49, 0.001, 7.1792], [50, -0.001, 2.4
 """Pairs 10 and 14, which only L*a*b* itself holds to the last digit."""
 
 
-@pytest.fixture(scope="module")
-def science() -> ModuleType:
-    """colour-science, which sets filters for warnings."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        return importlib.import_module("colour")
-
-
 def to_xyz(lab: np.ndarray) -> np.ndarray:
     """CIE 15:2018, the inverse of eqs. 8.3–8.8, white at Y = 1."""
     f = (lab[:, :1] + 16) / 116 + np.stack([lab[:, 1] / 500, 0 * lab[:, 1], -lab[:, 2] / 200], axis=1)
@@ -100,53 +85,6 @@ def test_itp_differences_follow_the_recommendations() -> None:
     assert delta_e_itp(60.0 * WHITE[None], 70.0 * WHITE[None]).item() == pytest.approx(0.0, abs=1e-6)  # both at the top
 
 
-def test_red_green_and_blue_have_the_primaries_of_srgb() -> None:
-    """IEC 61966-2-1: the chromaticities, D65 as white, and the encoding of a grey card, 1.055·0.18^(1/2.4) − 0.055."""
-    weights = colouring(("b", "R", "g")).weights[[1, 2, 0]]
-    expected = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]]
-    np.testing.assert_allclose((weights / weights.sum(axis=1, keepdims=True))[:, :2], expected, atol=ROUNDED)
-    np.testing.assert_allclose(weights.sum(axis=0), WHITE, atol=ROUNDED)
-    np.testing.assert_allclose(colour.to_srgb(0.18 * weights.sum(axis=0)), 1.055 * 0.18 ** (1 / 2.4) - 0.055, atol=1e-4)
-
-
-def test_a_display_shows_nothing_brighter_than_white() -> None:
-    weights = colouring(("r", "g", "b")).weights
-    np.testing.assert_allclose(colour.shown(5.0 * weights.sum(axis=0)), weights.sum(axis=0), atol=1e-9)
-    np.testing.assert_allclose(colour.shown(np.array([2.0, 0.5, -0.1]) @ weights), np.array([1, 0.5, 0]) @ weights)
-
-
-def test_a_flat_spectrum_is_white_and_a_line_has_its_own_colour() -> None:
-    """CIE 15:2018: white of D65 is 95.04, 100, 108.88; chromaticity of light of 520 nm is 0.0743, 0.8338."""
-    names = tuple(f"{w:g}nm" for w in np.arange(780, 379, -10))
-    weights = colouring(names).weights
-    np.testing.assert_allclose(weights.sum(axis=0), [0.9504, 1.0, 1.0888], atol=ROUNDED)
-    np.testing.assert_allclose(colouring(names[::-1]).weights[::-1], weights, rtol=1e-12)  # in any order
-    fine = tuple(str(w) for w in range(380, 781))
-    green = colouring(fine).weights[fine.index("520")]
-    np.testing.assert_allclose(green[:2] / green.sum(), [0.0743, 0.8338], atol=ROUNDED)
-
-
-@pytest.mark.parametrize(
-    ("channels", "words"),
-    [
-        (("value",), "one channel, drawn grey"),
-        (("1", "2"), "1 to 2 nm do not cover what an eye sees: drawn grey, from the mean of the channels"),
-        (("450", "550", "650"), "450 to 650 nm do not cover what an eye sees: drawn grey"),
-        (("400", "500", "600", "700"), "wavelengths 100 nm apart are too coarse for a colour: drawn grey"),
-        (("s", "p"), "channels s, p have no known colour: drawn grey, from their mean"),
-        (("500", "500"), "channels 500, 500 have no known colour"),
-    ],
-)
-def test_what_has_no_colour_is_grey_and_says_so(channels: tuple[str, ...], words: str) -> None:
-    found = colouring(channels)
-    assert found.words.startswith(words)
-    np.testing.assert_allclose(found.weights, np.tile(WHITE / len(channels), (len(channels), 1)), atol=ROUNDED)
-
-
-def test_tristimulus_values_are_taken_as_they_are() -> None:
-    np.testing.assert_array_equal(colouring(("y", "x", "z")).weights, np.eye(3)[[1, 0, 2]])
-
-
 def light(seed: int, top: float) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of colours within BT.2020, XYZ: any, some alike, black and greys."""
     rng = np.random.default_rng(seed)
@@ -178,35 +116,3 @@ def test_what_no_light_can_be_has_a_finite_difference() -> None:
     assert (lms.min(axis=1) < 0.0).all()
     found = delta_e_itp(imaginary, np.tile(WHITE, (2, 1)))
     assert np.all((found > 1.0) & (found < 720.0 * np.sqrt(1.0 + 1.7**2 + 4.4**2)))
-
-
-def test_displays_are_those_of_colour_science(science: ModuleType) -> None:
-    xyz = light(3, 1.2)[0]
-    matrix = science.RGB_COLOURSPACES["sRGB"].matrix_RGB_to_XYZ
-    np.testing.assert_array_equal(colour.FROM_SRGB, matrix)
-    linear = np.clip(xyz @ np.linalg.inv(matrix).T, 0.0, 1.0)
-    assert (linear < 0.0031308).any()
-    np.testing.assert_allclose(colour.to_srgb(xyz), science.cctf_encoding(linear, function="sRGB"), atol=1e-12)
-
-
-def test_the_observer_and_daylight_are_those_of_colour_science(science: ModuleType) -> None:
-    """Multiplied at 1 nm, D65 interpolated between its nodes of CIE 15:2018."""
-    wavelength, seen = colour._seen()
-    matching, daylight = science.MSDS_CMFS[OBSERVER], science.SDS_ILLUMINANTS[ILLUMINANT]
-    power = np.interp(wavelength, daylight.wavelengths, daylight.values, right=0.0)
-    np.testing.assert_array_equal(wavelength, matching.wavelengths)
-    np.testing.assert_allclose(seen, matching.values * power[:, None], rtol=1e-14)
-
-
-def test_no_colour_library_is_loaded() -> None:
-    code = """
-import sys
-import numpy as np
-from fitmat.match.appearance import colour
-spectrum = colour.colouring(tuple(map(str, range(380, 781, 10)))).weights
-colour.delta_e_2000(spectrum, spectrum[::-1]), colour.delta_e_itp(spectrum, spectrum[::-1])
-colour.shown(spectrum), colour.to_srgb(colour.colouring(("r", "g", "b")).weights)
-assert not {"colour", "scipy"} & set(sys.modules)
-"""
-    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

@@ -1,6 +1,6 @@
 """Differences of colours: spaces in which equal distances look alike, and the distances in them.
 
-It knows neither channels nor spectra; `colour` does.
+It knows neither channels nor spectra; `channels` and `observers` do.
 """
 
 import numpy as np
@@ -16,17 +16,45 @@ RGB_TO_LMS = np.array([[1688.0, 2146.0, 262.0], [683.0, 2951.0, 462.0], [99.0, 3
 LMS_TO_ICTCP = np.array([[2048.0, 2048.0, 0.0], [6610.0, -13613.0, 7003.0], [17933.0, -17390.0, -543.0]]) / 4096.0
 """ITU-R BT.2100-2, table 7, with the perceptual quantiser."""
 
+WHITE_LUMINANCE = 203.0
+"""Luminance of white in cd/m² where ΔE_ITP needs one: the reference white of ITU-R BT.2408-7, sec. 2.1."""
+
 HIGHEST_LUMINANCE = 10_000.0
 """What the perceptual quantiser of SMPTE ST 2084 can say at most, in cd/m²."""
 
 
-def to_lab(xyz: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3"]:
+def delta_e_2000(
+    one: Float[np.ndarray, "... 3"], other: Float[np.ndarray, "... 3"], white: Float[np.ndarray, "3"] = WHITE
+) -> Float[np.ndarray, "..."]:
+    """CIEDE2000 colour difference, `ciede2000`, of tristimulus values.
+
+    Args:
+        one: CIE XYZ.
+        other: The same of the other colours.
+        white: XYZ of what counts as white, Y = 1; D65 unless told.
+    """
+    return ciede2000(to_lab(one, white), to_lab(other, white))
+
+
+def delta_e_itp(one: Float[np.ndarray, "... 3"], other: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "..."]:
+    """ΔE_ITP, `itp`, of tristimulus values.
+
+    Args:
+        one: CIE XYZ, white D65 at Y = 1, which has `WHITE_LUMINANCE`; clipped to what ITU-R BT.2100 can say.
+        other: The same of the other colours.
+    """
+    pairs = (np.clip(WHITE_LUMINANCE * xyz, 0.0, HIGHEST_LUMINANCE) for xyz in (one, other))
+    return itp(*(to_ictcp(xyz) for xyz in pairs))
+
+
+def to_lab(xyz: Float[np.ndarray, "... 3"], white: Float[np.ndarray, "3"] = WHITE) -> Float[np.ndarray, "... 3"]:
     """CIE L*a*b* (CIE 15:2018, eqs. 8.3–8.11).
 
     Args:
-        xyz: CIE XYZ, white D65 at Y = 1.
+        xyz: CIE XYZ.
+        white: XYZ of what counts as white, Y = 1; D65 unless told.
     """
-    ratio = xyz / WHITE
+    ratio = xyz / white
     f = np.where(ratio > (6 / 29) ** 3, np.cbrt(ratio), (29 / 6) ** 2 / 3 * ratio + 4 / 29)
     x, y, z = f[..., 0], f[..., 1], f[..., 2]
     return np.stack([116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)], axis=-1)
