@@ -1,6 +1,6 @@
 """What is exported, executed: how far its values are from the model's own; writes the table of docs/exports.md.
 
-`python benchmarks/renderers.py`; needs Chromium, Mitsuba and the wheel MaterialX.
+`python benchmarks/renderers.py`; needs Chromium, glslangValidator, Mitsuba and the wheel MaterialX.
 """
 
 import sys
@@ -11,8 +11,9 @@ import jax
 import numpy as np
 
 import fitmat as fm
-from fitmat.exports import browser, mitsuba
+from fitmat.exports import browser, mitsuba, shaders
 from fitmat.exports.material import Chosen
+from fitmat.exports.shaders import DESKTOP, Shader
 from fitmat.exports.targets import TARGETS
 from fitmat.exports.translation import translated
 from fitmat.exports.verification import Difference, compared, directions, exact, run
@@ -31,6 +32,14 @@ def cells(found: Difference) -> list[str]:
     """Worst, mean and where."""
     place = f"{found.theta_i_deg:.1f}°, {found.theta_o_deg:.1f}°, {found.phi_deg:.0f}°"
     return [f"{found.largest:.1e}", f"{found.mean:.1e}", place]
+
+
+def desktop() -> list[list[str]]:
+    """One row: the same functions in the other version, compiled and not run."""
+    compilers = {shaders.compiled(shaders.texts("m", (), Shader(translated(sharp(name)), DESKTOP))) for name in NAMES}
+    if None in compilers:
+        sys.exit("no glslangValidator: nothing is compiled, and the table stays as it is")
+    return [["GLSL 3.30", f"all {len(NAMES)} above", "", "", "", "", f"compiled by {compilers.pop()}"]]
 
 
 def mitsubas() -> list[tuple[str, AbstractBRDF, Difference]]:
@@ -95,6 +104,7 @@ def main() -> None:
         ["GLSL ES 3.00", f"`{name}`", *cells(first), cells(second)[0], "yes"]
         for name, first, second in zip(NAMES, found[: len(NAMES)], found[len(NAMES) :], strict=True)
     ]
+    rows += desktop()
     rows += [["Mitsuba 3", f"`{model.name}`, {name}", *cells(d), "", "yes"] for name, model, d in mitsubas()]
     rows += approximated()
     headings = ["target", "model", "worst", "mean", "worst at θ_i, θ_o, φ", "worst, narrower", "executed"]

@@ -9,6 +9,7 @@ from fitmat.cli import examples, process
 from fitmat.cli.entry import app
 from fitmat.cli.flags.cache import ClearFlag
 from fitmat.cli.flags.export import (
+    BumpFlag,
     ExportOutFlag,
     MaterialNameFlag,
     NoVerifyFlag,
@@ -87,6 +88,7 @@ def export(
     name: MaterialNameFlag = None,
     theta_i: TableThetaIFlag = None,
     step: StepFlag = None,
+    bump: BumpFlag = False,
     strict: StrictFlag = False,
     no_verify: NoVerifyFlag = False,
     force: ReplaceExportFlag = False,
@@ -95,7 +97,7 @@ def export(
     process.set_up()
     from fitmat.cli import export
 
-    options = {"strict": strict, "verify": not no_verify, "force": force}
+    options = {"bump": bump, "strict": strict, "verify": not no_verify, "force": force}
     options |= {"model": model, "name": name} | export.grid(theta_i, step)
     process.say(str(export.written(result, to, out, **options)))
 

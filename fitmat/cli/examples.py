@@ -65,6 +65,7 @@ RENDER = (
 EXPORT = (
     "Written to --out, with export.json, the values and how far the target's are from the model's:\n\n"
     "  glsl: NAME.glsl, the function vec3 brdf(vec3 wi, vec3 wo) to paste; NAME.vert and NAME.frag, lit with it\n\n"
+    "  glsl-330: the same for desktop OpenGL\n\n"
     "  mitsuba: NAME.py, the dictionary; NAME.xml, a scene to include\n\n"
     "  materialx: NAME.mtlx, standard nodes or OpenPBR; openpbr: the closest OpenPBR surface\n\n"
     "  gltf: NAME.gltf, the closest material that it can hold\n\n"

@@ -77,14 +77,16 @@ def export(
     name: str | None = None,
     theta_i: ArrayLike | None = None,
     step: float | None = None,
+    bump: bool = False,
     strict: bool = False,
     verify: bool = True,
     force: bool = False,
 ) -> Export:
     """Write a material for a renderer, run it there, and say how far it is from the model.
 
-    GLSL: `NAME.glsl` holds the function `vec3 brdf(vec3 wi, vec3 wo)` to paste; `NAME.vert` and `NAME.frag` light with
-    it (uniforms mvpMatrix, mvMatrix, source, emission; attributes position at 0 and normal at 2). Mitsuba: `NAME.py`
+    GLSL, of ES 3.00 or of 3.30: `NAME.glsl` holds the function `vec3 brdf(vec3 wi, vec3 wo)` to paste; `NAME.vert` and
+    `NAME.frag` light with it (uniforms mvpMatrix, mvMatrix, source, emission; attributes position at 0 and normal at
+    2). Mitsuba: `NAME.py`
     holds the dictionary, `NAME.xml` the same as a scene to include. MaterialX: `NAME.mtlx`, standard nodes or the
     closest OpenPBR surface. glTF: `NAME.gltf`, the closest material that it holds. A table: `NAME.csv`, `NAME.parquet`
     and `NAME.json`, the values at a goniometer's angles. MERL: `NAME.binary`; Zemax:
@@ -93,12 +95,13 @@ def export(
 
     Args:
         material: A model, a fit, a study, or the result of one from `fitmat.load`.
-        target: "glsl", "mitsuba", "materialx", "openpbr", "gltf", "zemax", "table" or "merl".
+        target: "glsl", "glsl-330", "mitsuba", "materialx", "openpbr", "gltf", "zemax", "table" or "merl".
         folder: Where to; it appears complete or not at all. None to write nothing.
         model: Which model of a study; None for the one that the data prefer.
         name: Of the material, and of the files; None for that of the measurements, or of the model.
         theta_i: Zenith angles of incidence of a table in radians, (k,); None for those of reflection.
         step: Between its angles of reflection and between azimuths, radians; None for 5°, 15° of anisotropic materials.
+        bump: Whether the fragment shader bends the normal by the surface gradient of a height, its uniform `bump`.
         strict: Whether to refuse where the target differs from the model, instead of saying so.
         verify: Whether to run it, in Chromium or in Mitsuba, where there is one.
         force: Replace the files of an earlier export in the folder.
@@ -117,18 +120,20 @@ def export(
     arguments.choice("target", target, TARGETS)
     arguments.kind("folder", folder, str, os.PathLike, optional=True)
     arguments.kind("name", name, str, optional=True)
-    arguments.flags(strict=strict, verify=verify, force=force)
-    grid = {key: value for key, value in {"theta_i": theta_i, "step": step}.items() if value is not None}
-    if grid and not TARGETS[target].gridded:
-        gridded = ", ".join(key for key, one in TARGETS.items() if one.gridded)
-        raise ModelError(f"{next(iter(grid))} with target {target!r}, expected it with {gridded} only. Leave it out.")
+    arguments.flags(bump=bump, strict=strict, verify=verify, force=force)
+    more = {"theta_i": theta_i, "step": step, "bump": bump or None}
+    more = {key: value for key, value in more.items() if value is not None}
+    for key in more:
+        if key not in TARGETS[target].options:
+            having = ", ".join(name for name, one in TARGETS.items() if key in one.options)
+            raise ModelError(f"{key} with target {target!r}, expected it with {having} only. Leave it out.")
     what = chosen(material, model)
     called = name if name is not None else what.source or what.model.name
     options = {"strict": strict, "verify": verify}
     if folder is None:
-        return _made(what, target, called, grid, **options)
+        return _made(what, target, called, more, **options)
     with files.new(Path(folder), own=own, force=force) as draft:
-        made = _made(what, target, called, grid, **options)
+        made = _made(what, target, called, more, **options)
         for file, content in made.files.items():
             (draft / file).write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
     return dataclasses.replace(made, folder=Path(folder))
@@ -155,9 +160,9 @@ def file_name(name: str) -> str:
     return kept or "material"
 
 
-def _made(chosen: Chosen, target: str, name: str, grid: Mapping[str, Any], *, strict: bool, verify: bool) -> Export:
+def _made(chosen: Chosen, target: str, name: str, more: Mapping[str, Any], *, strict: bool, verify: bool) -> Export:
     made = TARGETS[target]
-    form = made.translate(chosen, **grid)
+    form = made.translate(chosen, **more)
     notes = tuple(made.notes(chosen, form))
     if strict and notes:
         raise ModelError(f"{' '.join(notes)} Leave out strict to export it all the same.")

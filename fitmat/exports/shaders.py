@@ -1,9 +1,24 @@
 """Shaders: a translated material as files, the function to paste and a vertex and a fragment shader that light with it.
 
-It translates nothing and runs nothing.
+It translates nothing; glslangValidator compiles them where there is one, and nothing here runs them.
 """
 
-from collections.abc import Sequence
+import dataclasses
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+
+from fitmat.errors import OutputError
+from fitmat.text import brief
+
+ES, DESKTOP = "300 es", "330"
+"""Versions of the language; a text of the first is one of the second."""
+
+COMPILER = "glslangValidator"
 
 VERTEX = """#version 300 es
 uniform mat4 mvpMatrix;  // object to clip space
@@ -46,20 +61,72 @@ void main() {
 }
 """
 
+SMOOTH = "vec3 n = normalize(interpolated_normal);"
+BUMPED = "vec3 n = bumped(normalize(interpolated_normal));"
 
-def texts(name: str, header: Sequence[str], brdf: str) -> dict[str, str]:
+
+@dataclasses.dataclass(frozen=True)
+class Shader:
+    """A material as a function, and what the pair of shaders around it is.
+
+    Attributes:
+        brdf: By `translation.translated`.
+        version: Of the language, `ES` or `DESKTOP`.
+        bump: Whether heights bend the normal.
+    """
+
+    brdf: str
+    version: str = ES
+    bump: bool = False
+
+    __repr__ = brief
+
+
+def texts(name: str, header: Sequence[str], shader: Shader) -> dict[str, str]:
     """File names → texts.
 
     Args:
         name: Of the files, without their ending.
         header: Lines that each begins with as comments; in shaders after the version, which must come first.
-        brdf: By `translation.translated`.
+        shader: The material.
     """
     comment = "".join(f"// {line}\n" for line in header)
-    version, rest = BEFORE.split("\n", 1)
-    _, vertex = VERTEX.split("\n", 1)
+    version = f"#version {shader.version}\n"
+    before, vertex = (text.split("\n", 1)[1] for text in (BEFORE, VERTEX))
+    if shader.version == DESKTOP:  # where every number is of single precision
+        before = re.sub(r"^precision .*\n", "", before, flags=re.MULTILINE).lstrip()
+    after = AFTER
+    if shader.bump:
+        heights = files("fitmat.exports").joinpath("bump.glsl").read_text(encoding="utf-8")
+        after = f"\n{heights}{AFTER.replace(SMOOTH, BUMPED)}"
     return {
-        f"{name}.glsl": comment + "\n" + brdf,
-        f"{name}.vert": f"{version}\n{comment}{vertex}",
-        f"{name}.frag": f"{version}\n{comment}{rest}{brdf}{AFTER}",
+        f"{name}.glsl": comment + "\n" + shader.brdf,
+        f"{name}.vert": f"{version}{comment}{vertex}",
+        f"{name}.frag": f"{version}{comment}{before}{shader.brdf}{after}",
     }
+
+
+def compiled(written: Mapping[str, str]) -> str | None:
+    """The compiler that took the pair of shaders among the texts, and linked them; None where there is none.
+
+    Raises:
+        OutputError: it refuses them, or does not run.
+    """
+    program = shutil.which(COMPILER)
+    if program is None:
+        return None
+    with tempfile.TemporaryDirectory(prefix="fitmat-shaders-") as folder:
+        kinds = "vert", "frag"
+        for name, text in written.items():
+            if (kind := name.rpartition(".")[2]) in kinds:
+                (Path(folder) / f"material.{kind}").write_text(text, encoding="utf-8")
+        command = [program, "-l", *(f"{folder}/material.{kind}" for kind in kinds)]
+        ended = subprocess.run(command, capture_output=True, text=True, check=False)
+        if ended.returncode:
+            said = " ".join(line for line in ended.stdout.splitlines() if "ERROR" in line).replace(f"{folder}/", "")
+            raise OutputError(
+                f"{program} refuses the shaders ({said or 'no reason'}); leave that out with --no-verify."
+            )
+    version = subprocess.run([program, "--version"], capture_output=True, text=True, check=False).stdout
+    found = re.search(r"Version: *([\w.:]+)", version)
+    return f"glslang {found[1] if found else ''}".rstrip()

@@ -3,6 +3,7 @@
 It writes nothing itself.
 """
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -26,12 +27,12 @@ class Target(NamedTuple):
 
     Attributes:
         title: What it is, with its version.
-        translate: What is exported → its form there; where `gridded` also theta_i and step.
+        translate: What is exported, and what of `options` was chosen → its form there.
         texts: Name of the files, header lines, form → file names and contents.
         difference: What is exported, form → how far its values there are; None where nothing runs it.
         notes: The same → what differs from the model, as sentences; `strict` refuses where there are any.
         facts: Form → what the record holds besides.
-        gridded: Whether it has a grid of angles, which can be chosen.
+        options: What else of it can be chosen: theta_i and step of a grid of angles, bump of a shader.
     """
 
     title: str
@@ -40,16 +41,33 @@ class Target(NamedTuple):
     difference: Callable[[Chosen, Any], Difference | None]
     notes: Callable[[Chosen, Any], Sequence[str]] = _none
     facts: Callable[[Any], Mapping[str, Any]] = _nothing
-    gridded: bool = False
+    options: tuple[str, ...] = ()
+
+
+GRID = ("theta_i", "step")
+
+
+def _shader(version: str) -> Target:
+    """GLSL in one of its versions; the values are those of its functions in a browser, which has the first."""
+
+    def translate(chosen: Chosen, *, bump: bool = False) -> shaders.Shader:
+        return shaders.Shader(translation.translated(chosen.model), version, bump)
+
+    def difference(chosen: Chosen, shader: shaders.Shader) -> Difference | None:
+        compiler = shaders.compiled(shaders.texts("material", (), shader))
+        found = verification.difference(chosen.model, shader.brdf)
+        if found is None or version == shaders.ES:
+            return found
+        taken = f", compiled as {title} by {compiler}" if compiler else f"; not compiled as {title}"
+        return dataclasses.replace(found, executor=f"{found.executor} as GLSL ES 3.00{taken}")
+
+    title = "GLSL ES 3.00" if version == shaders.ES else "GLSL 3.30"
+    return Target(title, translate, shaders.texts, difference, options=("bump",))
 
 
 TARGETS = {
-    "glsl": Target(
-        "GLSL ES 3.00",
-        lambda chosen: translation.translated(chosen.model),
-        shaders.texts,
-        lambda chosen, source: verification.difference(chosen.model, source),
-    ),
+    "glsl": _shader(shaders.ES),
+    "glsl-330": _shader(shaders.DESKTOP),
     "mitsuba": Target(
         "Mitsuba 3",
         lambda chosen: mitsuba.translated(chosen.model),
@@ -74,8 +92,8 @@ TARGETS = {
         materialx.notes,
         materialx.facts,
     ),
-    "table": Target("a table of angles", table.measured, table.texts, table.difference, gridded=True),
-    "zemax": Target("Zemax's tabulated BSDF", zemax.translated, zemax.texts, zemax.difference, gridded=True),
+    "table": Target("a table of angles", table.measured, table.texts, table.difference, options=GRID),
+    "zemax": Target("Zemax's tabulated BSDF", zemax.translated, zemax.texts, zemax.difference, options=GRID),
     "merl": Target("a MERL file", table.in_cells, table.file, table.looked_up, table.notes),
 }
 """Targets by name."""

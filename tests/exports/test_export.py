@@ -140,7 +140,7 @@ def test_what_is_found_is_said_everywhere(tmp_path: Path, monkeypatch: pytest.Mo
             lambda r: fm.export(LAMBERT, step=0.1),
             "step with target 'glsl', expected it with table, zemax only",
         ),
-        (lambda r: fm.export(LAMBERT, "hlsl"), "target is the text 'hlsl', expected 'glsl' or 'mit"),
+        (lambda r: fm.export(LAMBERT, "hlsl"), "target is the text 'hlsl', expected 'glsl' or 'glsl-330' or 'mit"),
     ],
 )
 def test_what_is_not_there_is_refused(result: Path, call: Any, sentence: str) -> None:

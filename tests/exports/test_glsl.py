@@ -142,6 +142,7 @@ for (const name of ["mvpMatrix", "mvMatrix"]) {
     gl.uniformMatrix4fv(gl.getUniformLocation(program, name), false, given[name]);
 }
 for (const name of ["source", "emission"]) gl.uniform3fv(gl.getUniformLocation(program, name), given[name]);
+for (const [name, value] of Object.entries(given.floats)) gl.uniform1f(gl.getUniformLocation(program, name), value);
 const points = [];
 const at = (i, j) => {
     const t = Math.PI * i / given.rings, p = 2 * Math.PI * j / given.rings;
@@ -180,45 +181,65 @@ HOSTILE = "it's \"é*/ --> </script>\\ \n#error \u202e\x1b[31m"
 """Ends of comments, of lines, of pages and of strings, other letters, and a backslash before the end of a line."""
 
 
+SIZE, FAR, WIDE = 256, 3.0, 2.0
+"""Pixels, distance of the ball of radius 1, and cotangent of half the angle of view."""
+
+LIGHT, EMISSION = np.array([2.0, 1.5, -0.5]), np.array([3.0, 2.0, 1.0])
+
+GILT = fm.model("lambert+ggx-aniso-schlick", kd=KD, f0=np.array([0.9, 0.6, 0.3]), alpha_x=0.3, alpha_y=0.6)
+
+
+def drawn(files: Mapping[str, str], **floats: float) -> np.ndarray:
+    """Pixels of the ball that a pair of shaders lights from the side, (SIZE, SIZE, 4), rows from below."""
+    shaders = {name.rpartition(".")[2]: text for name, text in files.items()}
+    view = np.eye(4)
+    view[2, 3] = -FAR
+    near, back = 1.0, 10.0
+    project = np.diag([WIDE, WIDE, (back + near) / (near - back), 0.0])
+    project[2, 3], project[3, 2] = 2.0 * back * near / (near - back), -1.0
+    told = {"size": SIZE, "rings": 200, "source": LIGHT.tolist(), "emission": EMISSION.tolist(), "floats": floats}
+    told |= {"mvMatrix": view.T.ravel().tolist(), "mvpMatrix": (project @ view).T.ravel().tolist()}
+    given = json.dumps(told | {"vert": shaders["vert"], "frag": shaders["frag"]}).replace("<", "\\u003c")
+    told = json.loads(browser.written(SPHERE.replace("GIVEN", given), chromium()))
+    assert (told["log"], told["error"]) == ([""], 0)
+    return np.frombuffer(base64.b64decode(told["pixels"]), "<f4").reshape(SIZE, SIZE, 4).astype(float)
+
+
+def met() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which pixels see the ball, (SIZE²,), where in the frame of the eye, (n, 3), and the ball's normal there."""
+    place = (np.arange(SIZE) + 0.5) / SIZE * 2.0 - 1.0
+    ray = np.stack([*np.meshgrid(place / WIDE, place / WIDE), -np.ones((SIZE, SIZE))], axis=-1).reshape(-1, 3)
+    ray /= np.linalg.norm(ray, axis=1)[:, None]
+    along = -FAR * ray[:, 2]
+    square = along**2 - FAR**2 + 1.0
+    inside = square > 0.05  # the rim of the triangles is not that of the ball
+    position = ray[inside] * (along[inside] - np.sqrt(square[inside]))[:, None]
+    return inside, position, position - [0.0, 0.0, -FAR]
+
+
+def radiance(model: AbstractBRDF, position: np.ndarray, n: np.ndarray) -> np.ndarray:
+    """f · I · cosθ_i/d² where a normal is n, (n, 3), the tangent around the object's y axis."""
+    t = np.cross([0.0, 1.0, 0.0], n)
+    t /= np.linalg.norm(t, axis=1)[:, None]
+    frame = np.stack([t, np.cross(n, t), n], axis=1)
+    beam = LIGHT - position
+    distance = np.linalg.norm(beam, axis=1)
+    eye = -position / np.linalg.norm(position, axis=1)[:, None]
+    wi, wo = (np.einsum("nij,nj->ni", frame, w) for w in (beam / distance[:, None], eye))
+    lit = np.maximum(wi[:, 2], 0.0) / distance**2
+    return fm.evaluate(model, wi, wo) * EMISSION * lit[:, None]
+
+
 def test_the_pair_lights_a_sphere_as_we_do() -> None:
     """A ball of radius 1 three away, brushed and gold-like, lit from the side: f · I · cosθ_i/d² at every pixel.
 
     The triangles are 1/200 of a turn, their corners on a raster of 1/256 pixel: that leaves 2e-3 of the largest value.
     """
-    size, far = 256, 3.0
-    model = fm.model("lambert+ggx-aniso-schlick", kd=KD, f0=np.array([0.9, 0.6, 0.3]), alpha_x=0.3, alpha_y=0.6)
-    texts = fm.export(model, "glsl", name=HOSTILE, verify=False).files
-    shaders = {name.rpartition(".")[2]: text for name, text in texts.items()}
-    source, emission = np.array([2.0, 1.5, -0.5]), np.array([3.0, 2.0, 1.0])
-    view = np.eye(4)
-    view[2, 3] = -far
-    near, back, wide = 1.0, 10.0, 2.0  # cotangent of half the angle of view
-    project = np.diag([wide, wide, (back + near) / (near - back), 0.0])
-    project[2, 3], project[3, 2] = 2.0 * back * near / (near - back), -1.0
-    told = {"size": size, "rings": 200, "source": source.tolist(), "emission": emission.tolist()}
-    told |= {"mvMatrix": view.T.ravel().tolist(), "mvpMatrix": (project @ view).T.ravel().tolist()}
-    given = json.dumps(told | {"vert": shaders["vert"], "frag": shaders["frag"]}).replace("<", "\\u003c")
-    told = json.loads(browser.written(SPHERE.replace("GIVEN", given), chromium()))
-    assert (told["log"], told["error"]) == ([""], 0)
-    pixels = np.frombuffer(base64.b64decode(told["pixels"]), "<f4").reshape(size, size, 4).astype(float)
-    place = (np.arange(size) + 0.5) / size * 2.0 - 1.0
-    ray = np.stack([*np.meshgrid(place / wide, place / wide), -np.ones((size, size))], axis=-1).reshape(-1, 3)
-    ray /= np.linalg.norm(ray, axis=1)[:, None]
-    along = -far * ray[:, 2]
-    square = along**2 - far**2 + 1.0
-    inside = square > 0.05  # the rim of the triangles is not that of the ball
-    position = ray[inside] * (along[inside] - np.sqrt(square[inside]))[:, None]
-    n = position - [0.0, 0.0, -far]
-    t = np.cross([0.0, 1.0, 0.0], n)
-    t /= np.linalg.norm(t, axis=1)[:, None]
-    frame = np.stack([t, np.cross(n, t), n], axis=1)
-    beam = source - position
-    distance = np.linalg.norm(beam, axis=1)
-    wi, wo = (np.einsum("nij,nj->ni", frame, w) for w in (beam / distance[:, None], -ray[inside]))
-    lit = np.maximum(wi[:, 2], 0.0) / distance**2
-    expected = fm.evaluate(model, wi, wo) * emission * lit[:, None]
+    pixels = drawn(fm.export(GILT, "glsl", name=HOSTILE, verify=False).files)
+    inside, position, n = met()
+    expected = radiance(GILT, position, n)
     found = pixels.reshape(-1, 4)[inside]
-    assert np.count_nonzero(lit > 0) > 10_000
+    assert np.count_nonzero(expected.max(axis=1) > 0) > 10_000
     assert np.abs(found[:, :3] - expected).max() < 2e-3 * expected.max()
     assert np.abs(found[:, :3] - 1.01 * expected).max() > 2e-3 * expected.max()
     assert np.array_equal(found[:, 3], np.ones(len(found)))

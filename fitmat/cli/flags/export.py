@@ -14,7 +14,7 @@ TargetFlag = Annotated[
     str,
     typer.Option(
         "--to",
-        help="What it is written for: glsl, mitsuba, materialx, openpbr, gltf, zemax, table, merl.",
+        help="What it is written for: glsl, glsl-330, mitsuba, materialx, openpbr, gltf, zemax, table, merl.",
         metavar="TARGET",
     ),
 ]
@@ -35,6 +35,11 @@ StepFlag = Annotated[
         help="Degrees between such a table's angles of reflection, and its azimuths; default 5, 15 if anisotropic.",
         show_default=False,
     ),
+]
+
+BumpFlag = Annotated[
+    bool,
+    typer.Option("--bump", help="Bend the normal in the fragment shader of glsl by a height's surface gradient."),
 ]
 
 ExportOutFlag = Annotated[
