@@ -16,6 +16,7 @@ from .judgement.choice import every_model as every_model
 from .maths.directions import directions as directions
 from .models.base import evaluate as evaluate
 from .models.albedo import albedo as albedo
+from .models.in_rgb import fresnel_in_rgb as fresnel_in_rgb
 from .models.multiple_scattering.surface import Surface as Surface
 from .models.multiple_scattering.random_walk import evaluate_walk as evaluate_walk
 from .models.multiple_scattering.random_walk import albedo_walk as albedo_walk

@@ -21,4 +21,4 @@ class OutputError(FitmatError):
 
 
 class ReadAs(UserWarning):
-    """A parameter was given by another name than the model's; the sentence says in which convention it was read."""
+    """Something was given in another form than the model's; the sentence says in which convention it was read."""

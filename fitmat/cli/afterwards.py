@@ -8,6 +8,7 @@ from pathlib import Path
 from fitmat.cli import examples, process
 from fitmat.cli.entry import app
 from fitmat.cli.flags.cache import ClearFlag
+from fitmat.cli.flags.colour import ColourPlotFlag, IlluminantFlag, MaterialFlag, TableFlag
 from fitmat.cli.flags.export import (
     BumpFlag,
     ExportOutFlag,
@@ -141,6 +142,20 @@ def models(
         manual.list_models()
     else:
         manual.page(name)
+
+
+@app.command(cls=Command, epilog=examples.COLOUR)
+def colour(
+    material: MaterialFlag = None,
+    table: TableFlag = None,
+    illuminant: IlluminantFlag = "D65",
+    plot: ColourPlotFlag = None,
+    force: ReplacePictureFlag = False,
+) -> None:
+    """Say what colour a metal or glass reflects, and how wrong Fresnel becomes in RGB."""
+    from fitmat.cli import colour
+
+    colour.show(material, table, illuminant, plot, force=force)
 
 
 @app.command(cls=Command)

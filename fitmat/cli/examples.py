@@ -82,3 +82,10 @@ PLOT = (
     "Examples:\n\n  fitmat plot run1 --what curves --out fit.pdf\n\n"
     "  fitmat plot run1 --what residuals --channel g --width 178 --out residuals.svg"
 )
+
+COLOUR = (
+    "Examples:\n\n"
+    "  fitmat colour Au\n\n"
+    "  fitmat colour brass --illuminant A --plot brass.pdf\n\n"
+    "  fitmat colour --table metals"
+)

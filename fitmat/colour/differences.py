@@ -19,6 +19,14 @@ LMS_TO_ICTCP = np.array([[2048.0, 2048.0, 0.0], [6610.0, -13613.0, 7003.0], [179
 WHITE_LUMINANCE = 203.0
 """Luminance of white in cd/m² where ΔE_ITP needs one: the reference white of ITU-R BT.2408-7, sec. 2.1."""
 
+JUST_NOTICEABLE, CLEARLY_VISIBLE = 1.0, 3.0
+"""ΔE2000 from which an eye may notice a difference side by side, and from which anybody does.
+
+Mokrzycki & Tatol 2011 (Machine Graphics & Vision 20(4)): below 1 not noticed, from 2–3.5 on by the untrained as well;
+Paravina et al. 2015 (J. Esthet. Restor. Dent. 27): half of the observers see 0.8 and reject 1.8. ΔE_ITP is scaled so
+that 1 is just noticeable (ITU-R BT.2124).
+"""
+
 HIGHEST_LUMINANCE = 10_000.0
 """What the perceptual quantiser of SMPTE ST 2084 can say at most, in cd/m²."""
 

@@ -3,17 +3,17 @@
 It fits nothing; it turns "this is gold" and "it may be tilted" into what `fit` understands.
 """
 
+import warnings
+
 import numpy as np
 
-from fitmat.errors import ModelError
+from fitmat.errors import ModelError, ReadAs
 from fitmat.measurements.samples import IN_PLANE, Measurements
+from fitmat.models import spectral
+from fitmat.models.in_rgb import RGB, WAYS, fresnel_in_rgb
 from fitmat.models.parameters import entries
-from fitmat.models.refractive_index import channel_wavelengths, index
 from fitmat.models.registry import LOBES, OVER, lobe_names, model
-from fitmat.models.terms.fresnel import Dielectric, f0_f82_from_ior
-
-ABSORBING = 0.01
-"""κ from which a material counts as a metal: the lower bound of the parameter."""
+from fitmat.models.terms.fresnel import COS_82, Dielectric
 
 OPTICAL = ("eta", "kappa", "f0", "f82")
 """Parameters that the refractive index determines."""
@@ -26,7 +26,8 @@ def of_material(name: str, material: str, channels: tuple[str, ...]) -> Known:
     """A model whose refractive index is held at the literature's: `ggx` and "Au" make ggx-conductor, η + iκ fixed.
 
     Every lobe with a Fresnel term takes the index. A metal in a lobe with the dielectric term turns it into
-    `-conductor`.
+    `-conductor`. In r, g and b it is the index whose curve comes closest to what the channel sees of the spectrum
+    (`spectral.channel_indices`); F0 and F82 are what it sees, at most 1.
 
     Args:
         name: Of the model.
@@ -40,9 +41,9 @@ def of_material(name: str, material: str, channels: tuple[str, ...]) -> Known:
         ModelError: no lobe has an index, the material is unknown, a channel has no wavelength, or a transparent
             material meets a conductor term.
     """
-    indices = index(material, channel_wavelengths(channels))
+    indices = spectral.channel_indices(material, channels)
     eta, kappa = np.real(indices), np.imag(indices)
-    metal = bool((kappa > ABSORBING).any())
+    metal = bool((kappa > spectral.ABSORBING).any())
     parts = lobe_names(name)
     bearers = [part for part in parts if "fresnel" in LOBES[part].parts]
     if not bearers:
@@ -52,7 +53,7 @@ def of_material(name: str, material: str, channels: tuple[str, ...]) -> Known:
     }
     covers, base = parts[: name.count(OVER)], parts[name.count(OVER) :]
     name = OVER.join([*covers, "+".join(renamed.get(part, part) for part in base)])
-    f0, f82 = f0_f82_from_ior(eta, kappa)
+    f0, f82 = np.minimum(spectral.seen_by(channels, material, np.array([1.0, COS_82])), 1.0)
     values: dict[str, np.ndarray] = dict(zip(OPTICAL, (eta, kappa, f0, f82), strict=True))
     names = {e.name: e for e in entries(model(name, channels=len(channels)))}
     known = {}
@@ -63,7 +64,21 @@ def of_material(name: str, material: str, channels: tuple[str, ...]) -> Known:
         for key in own:
             entry = names.get(f"{part}.{key}") or names[key]
             known[entry.name] = values[key] if entry.size == len(channels) else np.mean(values[key], keepdims=True)
+    if set(channels) == set(RGB):
+        _say_what_rgb_cannot_hold(material, {key.rpartition(".")[2] for key in known})
     return {name: known}
+
+
+def _say_what_rgb_cannot_hold(material: str, held: set[str]) -> None:
+    """Warn with `ReadAs` of what becomes of the material's colour with three numbers a term."""
+    way = "f82" if "f82" in held else "schlick" if "f0" in held else "closest"
+    apart, angle = fresnel_in_rgb(material).worst(way)
+    warnings.warn(
+        f"--ior {material}: Fresnel in RGB by {WAYS[way]}, r, g, b being linear sRGB. What three numbers cannot hold "
+        f"looks like ΔE2000 = {apart:.1f} at most, at {angle:.0f}° (D65; 1 is just noticeable).",
+        ReadAs,
+        stacklevel=2,
+    )
 
 
 def tilted(name: str, measurements: Measurements) -> Known:

@@ -130,6 +130,54 @@ def index(name: str, wavelength_nm: ArrayLike | Sequence[float]) -> Complex[np.n
     return found(wavelength)
 
 
+def span(name: str) -> tuple[float, float]:
+    """The shortest and the longest wavelength in nm at which the index of a material is known.
+
+    Args:
+        name: As in `index`.
+
+    Raises:
+        ModelError: the name or dataset is unknown.
+        FitmatError: as `index`.
+    """
+    found = _load(_dataset(name))
+    return found.low, found.high
+
+
+def describe(name: str) -> str:
+    """What a material is and who measured it; of a dataset that has no name here, the dataset.
+
+    Args:
+        name: As in `index`.
+    """
+    dataset = _dataset(name)
+    return next(
+        (m.doc for m in MATERIALS.values() if m.dataset == dataset), f"dataset {dataset} of refractiveindex.info."
+    )
+
+
+def alternatives(name: str) -> list[str]:
+    """All datasets of a material, as shelf/book/page, its own first.
+
+    Left out are films of a stated thickness, samples at a stated temperature, and calculations.
+
+    Args:
+        name: As in `index`.
+
+    Raises:
+        ModelError: the name is unknown.
+        FitmatError: the database is not installed.
+    """
+    own = _dataset(name)
+    shelf, book, _ = own.split("/")
+    database = needed("refractiveindex", f"other datasets of {name!r}")
+    pages = [m.page for m in database.search() if (m.shelf, m.book) == (shelf, book)]
+    return list(dict.fromkeys([own, *(f"{shelf}/{book}/{page}" for page in pages if not _SPECIAL.search(page))]))
+
+
+_SPECIAL = re.compile(r"-[\d.]+(nm|K|C)$|DFT")
+
+
 def channel_wavelengths(channels: tuple[str, ...]) -> Float[np.ndarray, " c"]:
     """The wavelength in nm at which the index of each channel is taken.
 

@@ -15,11 +15,10 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from fitmat.colour.differences import WHITE_LUMINANCE
+from fitmat.colour.differences import CLEARLY_VISIBLE, JUST_NOTICEABLE, WHITE_LUMINANCE
 from fitmat.fitting.concluding import RESULTS
 from fitmat.judgement import budget
 from fitmat.match.ablation import EXPLAINS
-from fitmat.match.appearance.spheres import CLEARLY_VISIBLE, JUST_NOTICEABLE
 from fitmat.match.discernibility import SEPARATED
 from fitmat.match.regions import REGIONS
 from fitmat.match.sentences import CLOSE, SIMILAR

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from fitmat.colour.differences import CLEARLY_VISIBLE, JUST_NOTICEABLE
 from fitmat.fitting.quantities import BOUND, UNDETERMINED
-from fitmat.match.appearance.spheres import CLEARLY_VISIBLE, JUST_NOTICEABLE
 from fitmat.match.distances import WITHIN
 from fitmat.match.regions import GRAZING_DEG
 from fitmat.match.sentences import CLOSE, SIMILAR, STRONG_EVIDENCE

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fitmat as fm
-from fitmat.errors import ModelError
+from fitmat.errors import ModelError, ReadAs
 from fitmat.fitting.known import of_material, prepare_known, tilted
 from fitmat.models.simulation import simulate
 
@@ -21,10 +21,17 @@ def test_gold_in_a_dielectric_lobe_makes_it_a_conductor() -> None:
 
 
 def test_every_fresnel_term_takes_the_index_in_its_own_terms() -> None:
-    """Per channel where the term is; F0 of water, 0.020, from η = 1.333."""
-    ((_, held),) = of_material("ggx-conductor", "Cu", ("r", "g", "b")).items()
+    """Per channel where the term is; F0 of water, 0.020, from η = 1.333; gold's red is 1.04, of which 1 is held."""
+    with pytest.warns(
+        ReadAs, match="--ior Cu: Fresnel in RGB by the exact equations .* looks like ΔE2000 = 0.1 at most"
+    ):
+        ((_, held),) = of_material("ggx-conductor", "Cu", ("r", "g", "b")).items()
     assert held["eta"].shape == held["kappa"].shape == (3,)
-    ((_, held),) = of_material("ggx", "water", ("r", "g", "b")).items()
+    with pytest.warns(ReadAs, match="--ior Au: Fresnel in RGB by Schlick's curve from F0 in RGB"):
+        ((_, held),) = of_material("ggx-schlick", "Au", ("b", "g", "r")).items()
+    assert held["f0"] == pytest.approx([0.364, 0.729, 1.0], abs=2e-3)
+    with pytest.warns(ReadAs, match="--ior water"):
+        ((_, held),) = of_material("ggx", "water", ("r", "g", "b")).items()
     assert held["eta"] == pytest.approx([1.333], abs=5e-3)
     ((_, held),) = of_material("ggx-schlick", "water", ("550",)).items()
     assert held["f0"] == pytest.approx([0.0204], abs=5e-4)

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.colour.channels import colouring
-from fitmat.colour.differences import delta_e_2000, delta_e_itp
+from fitmat.colour.differences import CLEARLY_VISIBLE, JUST_NOTICEABLE, delta_e_2000, delta_e_itp
 from fitmat.colour.spaces import shown, to_srgb
 from fitmat.match.appearance import scene
 from fitmat.match.appearance.scene import Raster, Screen
@@ -31,16 +31,8 @@ SPHERE_DRAWS = 20
 MIDDLE_GREY = 0.18
 """Mean luminance of the lit part of the reference, white being 1: that of a photographer's grey card."""
 
-JUST_NOTICEABLE, CLEARLY_VISIBLE = 1.0, 3.0
-"""ΔE2000 from which an eye may notice a difference side by side, and from which anybody does.
-
-Mokrzycki & Tatol 2011 (Machine Graphics & Vision 20(4)): below 1 not noticed, from 2–3.5 on by the untrained as well;
-Paravina et al. 2015 (J. Esthet. Restor. Dent. 27): half of the observers see 0.8 and reject 1.8. ΔE_ITP is scaled so
-that 1 is just noticeable (ITU-R BT.2124).
-"""
-
 SEES = ("see no difference", "hardly see a difference", "clearly see a difference")
-"""What is said below, between and above these."""
+"""What is said below, between and above `JUST_NOTICEABLE` and `CLEARLY_VISIBLE`."""
 
 SIZE = 72
 """Pictures are so many pixels wide."""

@@ -1,0 +1,121 @@
+"""Colour: what Fresnel's reflectance of a material looks like, and what RGB makes of it, as the command line shows it.
+
+It computes nothing itself.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from fitmat.colour import observers
+from fitmat.colour.spaces import FROM_SRGB, linear, to_srgb
+from fitmat.errors import FitmatError, ModelError
+from fitmat.models.in_rgb import WAYS, InRgb, fresnel_in_rgb, published
+from fitmat.models.refractive_index import MATERIALS, describe
+from fitmat.models.spectral import absorbs
+from fitmat.text import visible
+
+TABLES = ("metals", "dielectrics")
+AT = (0, 30, 60, 80)
+"""Degrees of the columns."""
+
+SPACES = {"srgb": "linear sRGB", "p3": "linear Display P3", "acescg": "ACEScg"}
+
+
+def show(material: str | None, table: str | None, illuminant: str, plot: Path | None, *, force: bool) -> None:
+    """Print what was asked for: one material, with its picture, or a table of all.
+
+    Raises:
+        FitmatError: neither or both were asked for, something is not known, or the picture cannot be written.
+    """
+    if table is not None and (material, plot, illuminant) != (None, None, "D65"):
+        raise ModelError("--table beside a material, --plot or --illuminant, expected it alone. Leave one out.")
+    if table is not None:
+        list_all(table)
+    elif material is None:
+        raise ModelError("expected a material or --table: fitmat colour Au, or fitmat colour --table metals.")
+    elif plot is None:
+        page(fresnel_in_rgb(material, illuminant))
+    else:
+        from fitmat.reports import colour_plot, pictures
+
+        pictures.refuse_picture(plot, force=force)
+        found = fresnel_in_rgb(material, illuminant)
+        pictures.write_picture(lambda: colour_plot.fresnel(found), plot)
+        page(found)
+
+
+def page(found: InRgb) -> None:
+    """Print the sentence, the colours and the errors of one material."""
+    reflected = Table("reflected, not clipped", "red", "green", "blue", box=None, pad_edge=False)
+    for name, values in (("F0", found.f0), ("F82", found.f82)):
+        for space, words in SPACES.items():
+            reflected.add_row(f"{name}, {words}", *_three(linear(values @ FROM_SRGB.T, space)))
+    reflected.add_row("edge tint, F82 over Schlick's", *_three(found.tint))
+    errors = Table("", *(f"{angle}°" for angle in AT), "most", "diffuse", box=None, pad_edge=False)
+    for way in WAYS:
+        at = [f"{found.delta_e_2000[way][angle]:.2f}" for angle in AT]
+        most, angle = found.worst(way)
+        errors.add_row(way, *at, f"{most:.2f} at {angle:.0f}°", f"{found.diffuse[way]:.2f}")
+    clipped = " (clipped)" if max(found.f0.max(), found.f82.max()) > 1.0 else ""
+    light = observers.ILLUMINANTS[found.illuminant]
+    out = Console()
+    _say(out, f"{visible(found.material)}: {visible(describe(found.material))}\n\n{found.sentence}\n")
+    out.print(reflected)
+    _say(out, f"On a display: {_hex(found.f0)} at 0°, {_hex(found.f82)} at 82°{clipped}.\n")
+    _say(out, f"ΔE2000 from the spectrum, under {light}; diffuse: lit from everywhere.")
+    out.print(errors)
+    _say(out, "\n" + "\n".join(f"{way}: {words}." for way, words in WAYS.items()))
+
+
+def list_all(kind: str) -> None:
+    """Print F0 and edge tint of all metals or dielectrics, and how far apart datasets are where the database is.
+
+    Raises:
+        ModelError: no such table.
+    """
+    if kind not in TABLES:
+        raise ModelError(f"--table {visible(kind)}: expected {' or '.join(TABLES)}.")
+    metals = kind == "metals"
+    heads = ("", "F0, linear sRGB", "sRGB", "edge tint", *(["furthest data"] if metals else []))
+    table, missing = Table(*heads, box=None, pad_edge=False), None
+    for name in MATERIALS:
+        if absorbs(name) != metals:
+            continue
+        found, cells = fresnel_in_rgb(name), []
+        try:
+            cells = [_furthest(name)] if metals else []
+        except FitmatError as error:
+            missing = error
+        table.add_row(name, " ".join(_three(found.f0)), _hex(found.f0), " ".join(_three(found.tint)), *cells)
+    out = Console()
+    out.print(table)
+    _say(
+        out,
+        "\nF0 under D65 (CIE 1931 2° observer), not clipped; as a display shows it; F82 over Schlick's curve there.",
+    )
+    if missing is not None:
+        _say(out, str(missing))
+    elif metals:
+        _say(out, "Furthest data: ΔE2000 to F0 of that dataset of refractiveindex.info, of so many.")
+
+
+def _furthest(name: str) -> str:
+    """How far F0 of the furthest dataset looks, whose it is, and of how many."""
+    known = published(name)
+    return f"{known.delta_e_2000:.1f} {known.furthest.rpartition('/')[2]} ({known.datasets})"
+
+
+def _say(out: Console, text: str) -> None:
+    out.print(Text(text))
+
+
+def _three(values: np.ndarray) -> list[str]:
+    return [f"{value:.3f}" for value in values]
+
+
+def _hex(rgb: np.ndarray) -> str:
+    return "#" + "".join(f"{round(255 * float(x)):02x}" for x in to_srgb(rgb @ FROM_SRGB.T))

@@ -1,0 +1,36 @@
+"""Flags of colour: which material, under which light.
+
+They set no default and check nothing but their type.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+MaterialFlag = Annotated[
+    str | None,
+    typer.Argument(
+        help="Au, gold, brass, N-BK7, water, …, or shelf/book/page of refractiveindex.info, as main/Au/McPeak.",
+        metavar="MATERIAL",
+        show_default=False,
+    ),
+]
+
+IlluminantFlag = Annotated[
+    str, typer.Option(help="CIE illuminant: D65, D50, A, FL2, FL11, LED-B3 or E.", metavar="NAME")
+]
+
+TableFlag = Annotated[
+    str | None,
+    typer.Option(
+        help="metals or dielectrics: F0 and edge tint in RGB of all that come with fitmat.",
+        metavar="KIND",
+        show_default=False,
+    ),
+]
+
+ColourPlotFlag = Annotated[
+    Path | None,
+    typer.Option(help="Draw colour and error by angle into this PNG, SVG or PDF.", metavar="FILE", show_default=False),
+]
