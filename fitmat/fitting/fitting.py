@@ -20,6 +20,7 @@ from fitmat.fitting.likelihood import Data, first_discrepancy, prepare
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.losses import loss as find_loss
 from fitmat.fitting.priors import prepare_prior, refuse_idle
+from fitmat.fitting.proportional import proportional
 from fitmat.fitting.refining import MAX_STEPS, ROUNDS, STARTS, confirmed, optima
 from fitmat.fitting.result import Fit
 from fitmat.fitting.seeing import seen
@@ -110,6 +111,8 @@ def fit(
     ends = confirmed(shown, data, starts, moved, max_steps)
     if measurements.sigma is not None and not chosen.infers_noise:  # noise that readings show has jitter in it
         data, ends = _with_jitter(measurements, shown, data, ends, moved, max_steps)
+    if not found_noise.known and chosen.infers_discrepancy:
+        found_noise, data, ends = proportional(measurements, shown, (found_noise, data), ends, moved, max_steps)
     return conclude(measurements, shown, held, (found_noise, data), ends)
 
 
