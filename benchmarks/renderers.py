@@ -1,6 +1,6 @@
 """What is exported, executed: how far its values are from the model's own; writes the table of docs/exports.md.
 
-`python benchmarks/renderers.py`; needs Chromium, glslangValidator, Mitsuba and the wheel MaterialX.
+`python benchmarks/renderers.py`; needs Chromium, glslangValidator, Mitsuba, the wheel MaterialX and Blender.
 """
 
 import sys
@@ -73,13 +73,13 @@ APPROXIMATED = {
 def approximated() -> list[list[str]]:
     """Rows of the targets that get the closest material: its values, run there, beside the model's own."""
     rows = []
-    for target in ("materialx", "openpbr", "gltf"):
+    for target in ("materialx", "openpbr", "gltf", "blender", "osl"):
         for name, model in APPROXIMATED.items():
             what, made = Chosen(model), TARGETS[target]
             form = made.translate(what)
             found = made.difference(what, form)
             if found is None:
-                sys.exit(f"{target} is not run here: needs the wheel MaterialX; the table stays as it is")
+                sys.exit(f"{target} is not run here: needs the wheel MaterialX, or Blender; the table stays as it is")
             closest = made.facts(form).get("closest")
             said = f"ΔE2000 {closest['delta_e']:.2f}" if closest else "the same"
             executed = "yes" if target != "gltf" else "its formulas, no viewer"

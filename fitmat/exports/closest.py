@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
+from fitmat.errors import ModelError
 from fitmat.exports.material import Chosen
 from fitmat.match.appearance.spheres import perceived
 from fitmat.match.carried import carried
@@ -162,6 +163,18 @@ def channels(chosen: Chosen) -> int:
     """How many channels the material's values have."""
     up = np.array([[0.0, 0.0, 1.0]])
     return at(chosen.model, up, up).shape[1]
+
+
+def coloured(chosen: Chosen, whose: str) -> int:
+    """The same for a target with colours.
+
+    Raises:
+        ModelError: neither 1 nor 3.
+    """
+    count = channels(chosen)
+    if count not in (1, 3):
+        raise ModelError(f"there are {count} channels, expected 1 or 3: the colours of {whose} are three.")
+    return count
 
 
 def _intervals(found: Imitation, chosen: Chosen, held: frozenset[str]) -> dict[str, Float[np.ndarray, "k 2"]]:

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.errors import ModelError
-from fitmat.exports.closest import Closest, channels, closest
+from fitmat.exports.closest import Closest, closest, coloured
 from fitmat.exports.material import Chosen
 from fitmat.exports.metallic_roughness import Clearcoated, template
 from fitmat.exports.verification import Difference, compared, directions, exact
@@ -39,10 +38,7 @@ def translated(chosen: Chosen) -> Closest:
     Raises:
         ModelError: neither 1 nor 3 channels.
     """
-    count = channels(chosen)
-    if count not in (1, 3):
-        raise ModelError(f"there are {count} channels, expected 1 or 3: the colours of glTF are three.")
-    return closest(chosen, *template(chosen.model, count))
+    return closest(chosen, *template(chosen.model, coloured(chosen, "glTF")))
 
 
 def notes(chosen: Chosen, found: Closest) -> list[str]:

@@ -11,7 +11,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from fitmat.errors import ModelError
-from fitmat.exports.closest import Closest, channels, closest
+from fitmat.exports.closest import Closest, closest, coloured
 from fitmat.exports.material import Chosen
 from fitmat.exports.materialx_models import Compensated, RoughDiffuse, template
 from fitmat.models.base import AbstractBRDF, Sum
@@ -84,8 +84,7 @@ def open_surface(chosen: Chosen) -> Document:
     Raises:
         ModelError: as `translated`.
     """
-    _checked(chosen)
-    found = closest(chosen, *template(channels(chosen)))
+    found = closest(chosen, *template(_checked(chosen)))
     v = found.values
     named: Inputs = {name: ("color3", v[name]) for name in ("base_color", "specular_color")}
     names = ("base_metalness", "base_diffuse_roughness", "specular_ior", "specular_roughness")
@@ -93,14 +92,15 @@ def open_surface(chosen: Chosen) -> Document:
     return Document((("open_pbr_surface", named),), found)
 
 
-def _checked(chosen: Chosen) -> None:
-    if (count := channels(chosen)) not in (1, 3):
-        raise ModelError(f"there are {count} channels, expected 1 or 3: the colours of MaterialX are three.")
+def _checked(chosen: Chosen) -> int:
+    """How many channels there are."""
+    count = coloured(chosen, "MaterialX")
     if not chosen.model.isotropic:
         raise ModelError(
             f"{chosen.model.name} is brushed, expected an isotropic material: MaterialX masks brushed ones by the mean "
             "of both slopes. Export it with --to gltf or --to glsl."
         )
+    return count
 
 
 def _own(lobe: AbstractBRDF) -> AbstractBRDF | None:

@@ -7,7 +7,21 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from fitmat.exports import gltf, materialx, materialx_shader, mitsuba, shaders, table, translation, verification, zemax
+from fitmat.exports import (
+    blender,
+    cycles,
+    gltf,
+    materialx,
+    materialx_shader,
+    mitsuba,
+    osl,
+    shaders,
+    table,
+    translation,
+    verification,
+    zemax,
+)
+from fitmat.exports.closest import Closest
 from fitmat.exports.material import Chosen
 from fitmat.exports.verification import Difference
 
@@ -47,6 +61,16 @@ class Target(NamedTuple):
 GRID = ("theta_i", "step")
 
 
+def _words(chosen: Chosen, found: Closest) -> Sequence[str]:
+    """Of a target that always gets the closest of its materials."""
+    del chosen
+    return found.words
+
+
+def _facts(found: Closest) -> Mapping[str, Any]:
+    return found.facts
+
+
 def _shader(version: str) -> Target:
     """GLSL in one of its versions; the values are those of its functions in a browser, which has the first."""
 
@@ -75,7 +99,7 @@ TARGETS = {
         lambda chosen, plugin: mitsuba.difference(chosen.model, plugin),
         lambda chosen, plugin: mitsuba.notes(chosen.model),
     ),
-    "gltf": Target("glTF 2.0", gltf.translated, gltf.texts, gltf.difference, gltf.notes, lambda found: found.facts),
+    "gltf": Target("glTF 2.0", gltf.translated, gltf.texts, gltf.difference, gltf.notes, _facts),
     "materialx": Target(
         "MaterialX 1.39.5",
         materialx.translated,
@@ -91,6 +115,22 @@ TARGETS = {
         materialx_shader.difference,
         materialx.notes,
         materialx.facts,
+    ),
+    "blender": Target(
+        "Blender's Principled BSDF, in Cycles 5.0",
+        blender.translated,
+        blender.texts,
+        lambda chosen, found: cycles.difference(chosen.model, blender.code("material", found)),
+        _words,
+        _facts,
+    ),
+    "osl": Target(
+        "OSL, in Cycles 5.0",
+        osl.translated,
+        osl.texts,
+        lambda chosen, closures: cycles.difference(chosen.model, osl.CODE, {"material.osl": osl.shader(closures)}),
+        osl.notes,
+        osl.facts,
     ),
     "table": Target("a table of angles", table.measured, table.texts, table.difference, options=GRID),
     "zemax": Target("Zemax's tabulated BSDF", zemax.translated, zemax.texts, zemax.difference, options=GRID),

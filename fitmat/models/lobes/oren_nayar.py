@@ -177,12 +177,18 @@ class EnergyPreservingOrenNayar(AbstractDiffuse):
     )  # fmt: skip
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
-        """kd/π A (1 + r s/t) plus the light that meets several facets; r cancels from 1 − Ē and stays finite at 0."""
+        """kd/π A (1 + r s/t) plus the light that meets several facets."""
+        once, more = self.bounces(wi, wo)
+        return self.kd * once + self.multiple() * more
+
+    def bounces(self, wi: Vec3, wo: Vec3) -> tuple[Scalar, Scalar]:
+        """A/π (1 + r s/t), and what kd_ms is a factor of; r cancels from 1 − Ē and both stay finite at 0."""
         a = 1.0 / (1.0 + C1_FON * self.r)
         s = _shadow(wi, wo)
-        once = self.kd * a * (1.0 + self.r * jnp.where(s > 0.0, s / _larger_cos(wi, wo), s))
+        once = a * (1.0 + self.r * jnp.where(s > 0.0, s / _larger_cos(wi, wo), s))
         lost = self.r * a * _missing(wi) * _missing(wo) / (C1_FON - C2_FON)
-        return jnp.where(above(wi, wo), (once + self._multiple() * lost) / jnp.pi, 0.0)
+        up = above(wi, wo)
+        return jnp.where(up, once / jnp.pi, 0.0), jnp.where(up, lost / jnp.pi, 0.0)
 
     def glsl(self) -> str:
         """The same."""
@@ -211,7 +217,7 @@ vec3 lobe(vec3 wi, vec3 wo) {
         """Ē = A (1 + (2/3 − 28/(15π)) r)."""
         return (1.0 + C2_FON * self.r) / (1.0 + C1_FON * self.r)
 
-    def _multiple(self) -> Spectrum:
+    def multiple(self) -> Spectrum:
         """kd_ms."""
         mean = self._average()
         return self.kd**2 * mean / (1.0 - self.kd * (1.0 - mean))
