@@ -73,7 +73,7 @@ APPROXIMATED = {
 def approximated() -> list[list[str]]:
     """Rows of the targets that get the closest material: its values, run there, beside the model's own."""
     rows = []
-    for target in ("materialx", "openpbr", "gltf", "blender", "osl"):
+    for target in ("materialx", "openpbr", "gltf", "usd", "blender", "osl"):
         for name, model in APPROXIMATED.items():
             what, made = Chosen(model), TARGETS[target]
             form = made.translate(what)
@@ -82,7 +82,7 @@ def approximated() -> list[list[str]]:
                 sys.exit(f"{target} is not run here: needs the wheel MaterialX, or Blender; the table stays as it is")
             closest = made.facts(form).get("closest")
             said = f"ΔE2000 {closest['delta_e']:.2f}" if closest else "the same"
-            executed = "yes" if target != "gltf" else "its formulas, no viewer"
+            executed = "its formulas, no viewer" if target in ("gltf", "usd") else "yes"
             rows.append([made.title, f"`{model.name}`, {name}: {said}", *cells(found), "", executed])
             print(*rows[-1], flush=True)
     return rows

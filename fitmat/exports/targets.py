@@ -18,6 +18,7 @@ from fitmat.exports import (
     shaders,
     table,
     translation,
+    usd,
     verification,
     zemax,
 )
@@ -116,6 +117,7 @@ TARGETS = {
         materialx.notes,
         materialx.facts,
     ),
+    "usd": Target("OpenUSD's UsdPreviewSurface", usd.translated, usd.texts, usd.difference, _words, _facts),
     "blender": Target(
         "Blender's Principled BSDF, in Cycles 5.0",
         blender.translated,
