@@ -133,6 +133,25 @@ def interval_bar(
     ).format(w=width, r=width - 2, what=what, beside=beside, x=start, l=max(end - start, 2.0), v=at(best))
 
 
+def next_angle(place: Record | None) -> Markup:
+    """Where the light stands for the next curve, and how the sensor moves, from the side; "" without one."""
+    if place is None:
+        return Markup("")
+
+    def at(angle: float, far: float) -> tuple[float, float]:
+        return 60.0 + far * math.sin(math.radians(angle)), 60.0 - far * math.cos(math.radians(angle))
+
+    light, (low, high) = place["theta_i_deg"], place["theta_o_deg"]
+    (a, b), (c, d), (e, f) = at(-light, 54.0), at(low, 42.0), at(high, 42.0)
+    what = f"Measure next: light at {light:g}°, sensor from {low:g}° to {high:g}°"
+    return Markup(
+        '<svg class="geometry" viewBox="0 0 120 66" width="132" height="73" role="img" aria-label="{what}">'
+        '<title>{what}</title><path class="surface" d="M4,61 H116"/><path class="normal" d="M60,61 V8"/>'
+        '<path class="sensor" d="M{c:.1f},{d:.1f} A42,42 0 0 1 {e:.1f},{f:.1f}"/>'
+        '<path class="light" d="M{a:.1f},{b:.1f} L60,60"/><circle class="light" cx="{a:.1f}" cy="{b:.1f}" r="4"/></svg>'
+    ).format(what=what, a=a, b=b, c=c, d=d, e=e, f=f)
+
+
 def share_bar(value: float | None, ends: Sequence[float] | None, what: str, width: int = 160) -> Markup:
     """A fraction as a bar to the right of zero, or to its left where it is negative, with its interval as a line."""
     if value is None:

@@ -133,6 +133,7 @@ def environment() -> jinja2.Environment:
         "static_curves": drawings.curves,
         "interval_bar": drawings.interval_bar,
         "share_bar": drawings.share_bar,
+        "next_angle": drawings.next_angle,
     }
     return environment
 

@@ -4,29 +4,26 @@ They read the record and decide nothing that a named threshold does not; page an
 """
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from fitmat.colour.differences import CLEARLY_VISIBLE, JUST_NOTICEABLE
-from fitmat.fitting.quantities import BOUND, UNDETERMINED
+from fitmat.fitting.quantities import UNDETERMINED
 from fitmat.match.distances import WITHIN
 from fitmat.match.regions import GRAZING_DEG
 from fitmat.match.sentences import CLOSE, SIMILAR, STRONG_EVIDENCE
-from fitmat.text import with_error
+from fitmat.studies.likeness import likeness, listed
 
 MOST_WORDS = 25
 """Of a sentence."""
 
-GLOSS = ((0.03, "mirror-smooth"), (0.12, "glossy"), (0.25, "satin"), (0.45, "dull"), (np.inf, "matte"))
-"""Width α of the lobe below which a surface is called so."""
+FEW = 2
+"""Of so many models or fewer, more can be tried."""
 
-METAL = 0.3
-"""F0 from which a surface that is less diffuse than that is called a metal: dielectrics stay below 0.2 (η < 2.6)."""
-
-DIFFUSE = 0.02
-"""Albedo of a diffuse part up to which there is hardly one."""
+ACROSS_DEG = 135.0
+"""Relative azimuth below which a curve is said to lie across the plane of incidence, not in it."""
 
 SERVES_FROM_DEG = 20.0
 """An empirical model that holds up to smaller incidences only is said not to serve."""
@@ -95,101 +92,20 @@ def _has_values(fit: Record) -> bool:
     return (
         fit["result"] != "nonfinite"
         and bool(every)
-        and all(value is not None for one in every for value in _listed(one))
+        and all(value is not None for one in every for value in listed(one))
     )
-
-
-def _listed(value: Any) -> list[Any]:
-    return list(value) if isinstance(value, Sequence) and not isinstance(value, str) else [value]
 
 
 def _material(record: Record) -> Card:
     fit = best(record)
     if fit is None:
         return Card("The material", BAD, "no values", "No model was fitted: nothing finite was found in these data.")
-    told = {**fit["derived"], **fit["parameters"]}
-    parts = [*_diffuse(told), *_mirror(told), *_width(told)]
-    name, kind = title(fit["model"]), _kind(told)
-    listed = ", ".join(parts) or "its parameters are not determined"
-    words = f"Like {kind}: {listed} ({name})." if kind else f"{name}: {listed}."
+    name, (kind, parts) = title(fit["model"]), likeness(fit)
+    numbers = ", ".join(parts) or "its parameters are not determined"
+    words = f"Like {kind}: {numbers} ({name})." if kind else f"{name}: {numbers}."
     if fit["inadequate"]:
         return Card("The material", CAUTION, "nearest model", words)
     return Card("The material", GOOD, "best model", words)
-
-
-def _sure(told: Record, name: str) -> Record | None:
-    """A quantity, where there is one whose value can be relied on."""
-    found = told.get(name)
-    if found is None or any(remark == UNDETERMINED or BOUND in remark for remark in _listed(found["remark"])):
-        return None
-    return found
-
-
-def _percent(values: list[float]) -> str:
-    """In percent: one number, a few with slashes, or from the least to the largest."""
-    texts = list(dict.fromkeys(f"{100 * v:.2g}" if 0.0005 <= v < 0.995 else f"{100 * v:.3g}" for v in values))
-    if len(texts) == 1:
-        return f"{texts[0]} %"
-    if len(values) <= 3:
-        return "/".join(f"{100 * v:.2g}" for v in values) + " %"
-    return f"{100 * min(values):.2g}–{100 * max(values):.2g} %"
-
-
-def _diffuse(told: Record) -> list[str]:
-    kd = _sure(told, "kd")
-    return [] if kd is None else [f"diffuse {_percent(_listed(kd['value']))}"]
-
-
-def _mirror(told: Record) -> list[str]:
-    """What is reflected like by a mirror: F0, or what of it is determined, or the weight of an empirical lobe."""
-    for name, called in (("f0", "F0"), ("ks·F0", "ks·F0")):
-        if (found := _sure(told, name)) is not None:
-            return [f"{called} {_two_digits(_listed(found['value']))}"]
-    if (ks := _sure(told, "ks")) is not None and "eta" not in told:
-        return [f"specular weight {_listed(ks['value'])[0]:.2g}"]
-    return []
-
-
-def _two_digits(values: list[float]) -> str:
-    if len(values) == 1:
-        return f"{100 * values[0]:#.2g}".rstrip(".") + " %"
-    return _percent(values)
-
-
-def _width(told: Record) -> list[str]:
-    for name, letter in (("alpha", "α"), ("alpha_x", "αx"), ("exponent", "exponent")):
-        found = _sure(told, name)
-        if found is not None and not isinstance(found["value"], list):
-            sd = found["sd"] if found["sd"] is not None else np.nan
-            across = _sure(told, "alpha_y") if name == "alpha_x" else None
-            beside = [] if across is None else [f"αy {across['value']:.3g}"]
-            return [f"{letter} {_shortly(found['value'], sd)}", *beside]
-    return []
-
-
-def _shortly(value: float, sd: float) -> str:
-    """As `with_error`, the error to one digit."""
-    text = with_error(value, sd)
-    digits = text.partition(" ± ")[2]
-    if not digits or "e" in text or "." not in digits:
-        return text
-    places = max(len(digits.partition(".")[2]) - 1, 1)
-    return f"{value:.{places}f} ± {sd:.{places}f}"
-
-
-def _kind(told: Record) -> str:
-    """What such a surface is like, in two words; "" where gloss or reflectance is not known."""
-    alpha, f0, kd = _sure(told, "alpha"), _sure(told, "f0") or _sure(told, "ks·F0"), _sure(told, "kd")
-    if alpha is None or isinstance(alpha["value"], list) or (f0 is None and kd is None):
-        return ""
-    gloss = next(word for limit, word in GLOSS if alpha["value"] < limit)
-    diffuse = float(np.mean(_listed(kd["value"]))) if kd is not None else 0.0
-    mirror = float(np.mean(_listed(f0["value"]))) if f0 is not None else 0.0
-    if mirror >= METAL and diffuse < mirror:
-        return f"{gloss} metal"
-    if diffuse > DIFFUSE:
-        return f"{gloss} paint" if gloss in ("dull", "matte") else f"{gloss} plastic"
-    return f"a {gloss} dielectric"
 
 
 def _phong(record: Record) -> Card:
@@ -244,13 +160,23 @@ PLACES = {
 """Region of `match.regions` → where that is."""
 
 
+def next_angle(record: Record) -> str:
+    """What to measure next: "incidence 80°"; "" where no angle is worth it."""
+    place = record.get("next")
+    if place is None:
+        return ""
+    turned = f" turned {place['phi_i_deg']:.3g}°" if place["phi_i_deg"] else ""
+    across = " across the plane" if place["phi_deg"] < ACROSS_DEG else ""
+    return f"incidence {place['theta_i_deg']:.3g}°{turned}{across}"
+
+
 def _trust(record: Record) -> Card:
     fit, question = best(record), "Can I trust it?"
     if fit is None:
         return Card(
             question, BAD, "no", "No: no fit ended with finite values; check the columns and units of the file."
         )
-    name, lost = title(fit["model"]), fit["not_determined"]
+    name = title(fit["model"])
     ratio = fit["misfit_ratio"]
     misses = f"{name} misses the data by {ratio:.2g} × the noise" if ratio is not None and fit["inadequate"] else ""
     if not fit["intervals_hold"]:
@@ -260,24 +186,39 @@ def _trust(record: Record) -> Card:
         words = f"In part: {name} is a single best fit under the loss {record['loss']['name']}, without intervals."
         return Card(question, CAUTION, "no intervals", words)
     if misses:
-        return Card(question, CAUTION, "with care", f"With care: {misses}; the intervals allow for that.")
-    if lost:
-        few = ", ".join(lost[:3]) + (f" and {len(lost) - 3} more" if len(lost) > 3 else "")
-        verb, states = "is" if len(lost) == 1 else "are", (fit["identifiability"] or {"parameters": {}})["parameters"]
-        why = " by these angles; `fitmat design` says what to measure next"
-        open_ = [state for state in states.values() if state["state"] == UNDETERMINED]
-        if open_ and all(state.get("misfit") for state in open_):
-            why = ", because the model misses the data; another model may say more"
-        return Card(question, CAUTION, "in part", f"In part: {few} {verb} not determined{why}.")
+        others = "; try --models all" if len(record["fits"]) <= FEW else ""
+        return Card(question, CAUTION, "with care", f"With care: {misses}; the intervals allow for that{others}.")
+    if fit["not_determined"]:
+        return Card(question, CAUTION, "in part", _lost(record, fit))
     if fit["adequacy"].startswith("adequacy unknown"):
-        words = "Not known: nobody stated the noise, so whether the model is adequate cannot be judged."
-        return Card(question, UNKNOWN, "not known", words)
+        words = "Not known: nobody stated the noise, so whether the model is adequate cannot be judged"
+        where = next_angle(record)
+        return Card(question, UNKNOWN, "not known", f"{words}{f'; measure next: {where}' if where else ''}.")
     return _trusted(record, fit, name, question)
+
+
+def _lost(record: Record, fit: Record) -> str:
+    """What these angles leave open, and where to look."""
+    where, states = next_angle(record), (fit["identifiability"] or {"parameters": {}})["parameters"]
+    why = " by these angles; " + (f"measure next: {where}" if where else "`fitmat design` says what to measure next")
+    open_ = [state for state in states.values() if state["state"] == UNDETERMINED]
+    if open_ and all(state.get("misfit") for state in open_):
+        why = ", because the model misses the data; another model may say more"
+    return _within(fit["not_determined"], lambda few, verb: f"In part: {few} {verb} not determined{why}.")
+
+
+def _within(names: Sequence[str], words: Callable[[str, str], str]) -> str:
+    """A sentence about parameters that names as many of them as `MOST_WORDS` allow, at most three."""
+    verb, many = "is" if len(names) == 1 else "are", len(names)
+    named = [", ".join(names[:most]) + (f" and {many - most} more" if many > most else "") for most in (3, 2, 1)]
+    sentences = [words(few, verb) for few in (*named, f"{many} parameters")]
+    return next((one for one in sentences if len(one.split()) <= MOST_WORDS), sentences[-1])
 
 
 def _trusted(record: Record, fit: Record, name: str, question: str) -> Card:
     """Where nothing speaks against the model."""
-    sure = "every parameter is determined" if fit["identifiability"] is not None else "nothing speaks against it"
+    asked, where = fit["identifiability"] is not None, next_angle(record)
+    sure = "every parameter is determined" if asked else "nothing speaks against it"
     follows = f"{name} follows the data within the noise"
     if fit["posterior"]["verdict"] in ("unusable", "approximate"):
         words = f"With care: {follows}, but the posterior is {fit['posterior']['verdict']}: the intervals may be wrong."
@@ -285,10 +226,13 @@ def _trusted(record: Record, fit: Record, name: str, question: str) -> Card:
     states = (fit["identifiability"] or {"parameters": {}})["parameters"].items()
     weak = list(dict.fromkeys(k.partition(" ")[0] for k, v in states if v["state"] != "determined"))
     if weak:
-        few = ", ".join(weak[:3]) + (f" and {len(weak) - 3} more" if len(weak) > 3 else "")
-        words = f"Mostly: {follows}, but {few} {'is' if len(weak) == 1 else 'are'} only weakly determined."
+        then = f"; measure next: {where}" if where else ""
+        words = _within(weak, lambda few, verb: f"Mostly: {follows}, but {few} {verb} only weakly determined{then}.")
         return Card(question, CAUTION, "mostly", words)
     if doubts := len(fit["doubts"]) + len(record["warnings"]):
         said = "a remark on the data is" if doubts == 1 else f"{doubts} remarks on the data are"
         return Card(question, CAUTION, "mostly", f"Mostly: {follows} and {sure}, but {said} below.")
-    return Card(question, GOOD, "yes", f"Yes: {follows} and {sure}.")
+    if where:
+        rival = title(record["next"]["against"] or "")
+        return Card(question, GOOD, "yes", f"Yes: {follows} and {sure}; {where} would tell it from {rival}.")
+    return Card(question, GOOD, "yes", f"Yes: {follows} and {sure}{'; no further angle is needed' if asked else ''}.")

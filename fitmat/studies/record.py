@@ -3,6 +3,7 @@
 It computes nothing; numbers that are not finite become null.
 """
 
+import dataclasses
 import platform
 from importlib.metadata import version
 from typing import Any
@@ -48,6 +49,7 @@ def to_dict(study: Study, command: str | None = None) -> dict[str, Any]:
             "fits": [fit_dict(found) for found in study.findings],
             "choice": None if study.choice is None else _choice_dict(study.choice),
             "match": None if study.match is None else match_record.to_dict(study.match, _line(study)),
+            "next": None if study.advice is None else dataclasses.asdict(study.advice),
         }
     )
 

@@ -27,6 +27,7 @@ from fitmat.measurements.large.stream import Stream
 from fitmat.measurements.reader import measurements_of
 from fitmat.measurements.samples import Measurements
 from fitmat.models.around.tilt import Tilted
+from fitmat.studies.advice import Advice, advise
 from fitmat.studies.findings import Findings, find
 from fitmat.studies.large import as_stream, counted, pass_over
 from fitmat.studies.plan import DEFAULT_MODELS, plan, refuse_unsampled
@@ -52,6 +53,7 @@ class Study:
         match: Of an empirical and a microfacet model among them; None where there is no such pair.
         choice: Which model the data prefer; None under a loss that weighs no models, and of a single model.
         distance: Where the uncertainty of the match's distance comes from; None where there is no match or no budget.
+        advice: The one next angle worth measuring; None where none is.
         full: Whether everything was asked; see `study`.
         warnings: What is odd about the measurements themselves, as sentences.
         rows: How many rows were given, and in how many of them something is masked, where `measurements` holds only
@@ -62,6 +64,7 @@ class Study:
     match: Match | None = None
     choice: Choice | None = None
     distance: Line | None = None
+    advice: Advice | None = None
     full: bool = False
     warnings: tuple[str, ...] = ()
     rows: tuple[int, int] | None = None
@@ -220,7 +223,8 @@ def judge(
     if second_opinion:
         asked = [found.posterior in looked_at and found.posterior.chain is not None for found in findings]
         findings = [_asked_again(f, seed, say) if again else f for f, again in zip(findings, asked, strict=True)]
-    return Study(tuple(findings), match, choice, _distance(match), full, odd.result())
+    advice = advise(findings, match, choice)
+    return Study(tuple(findings), match, choice, _distance(match), advice, full, odd.result())
 
 
 def _distance(match: Match | None) -> Line | None:

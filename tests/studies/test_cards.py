@@ -68,7 +68,9 @@ def test_a_plastic_is_told_in_three_sentences() -> None:
     assert phong.sentence == (
         "Blinn–Phong does not serve: ΔE2000 5.3 on average; 97 % of the difference to GGX lies beyond 70°."
     )
-    assert trust.sentence == "Yes: GGX follows the data within the noise and every parameter is determined."
+    assert trust.sentence == (
+        "Yes: GGX follows the data within the noise and every parameter is determined; no further angle is needed."
+    )
     assert [card.level for card in (material, phong, trust)] == [GOOD, BAD, GOOD]
 
 
@@ -190,6 +192,42 @@ def test_trust_says_what_speaks_against_it(changes: Any, level: str, words: str)
     assert trust.level == level
     assert words in trust.sentence
     assert len(trust.sentence.split()) <= MOST_WORDS
+
+
+def place(**changes: Any) -> dict[str, Any]:
+    """A curve to measure next."""
+    plain = {"target": "eta", "against": None, "theta_i_deg": 80.0, "phi_i_deg": 0.0, "phi_deg": 180.0}
+    return plain | {"theta_o_deg": [-80.0, 80.0]} | changes
+
+
+def weak(*names: str) -> dict[str, Any]:
+    return {"identifiability": {"parameters": {name: {"state": "weakly determined"} for name in names}}}
+
+
+@pytest.mark.parametrize(
+    ("changes", "where", "words"),
+    [
+        ({"not_determined": ["eta"]}, place(), "eta is not determined by these angles; measure next: incidence 80°."),
+        (weak(*"abcdefgh"), place(), "but a, b, c and 5 more are only weakly determined; measure next: incidence 80°."),
+        (
+            weak(*"abcdefgh"),
+            place(phi_i_deg=45.0, phi_deg=90.0),
+            "but 8 parameters are only weakly determined; measure next: incidence 80° turned 45° across the plane.",
+        ),
+        (
+            {"adequacy": "adequacy unknown: the noise is not known"},
+            place(),
+            "cannot be judged; measure next: incidence 80°.",
+        ),
+        ({}, place(target="match", against="lambert+blinn-phong"), "; incidence 80° would tell it from Blinn–Phong."),
+    ],
+)
+def test_what_to_measure_next_is_said_once_and_briefly(changes: Any, where: Any, words: str) -> None:
+    told = record(fits=[fitted("lambert+ggx", **changes)], match=None, next=where)
+    trust = cards(told)[2]
+    assert trust.sentence.endswith(words)
+    assert len(trust.sentence.split()) <= MOST_WORDS
+    assert "incidence" not in cards(told | {"next": None})[2].sentence
 
 
 def test_an_objective_has_no_intervals_and_nothing_finite_no_values() -> None:

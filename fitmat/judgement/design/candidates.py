@@ -31,7 +31,7 @@ TURNS = (0.0, 45.0, 90.0, 135.0)
 """Azimuths of incidence, degrees, for anisotropic models."""
 
 SCAN = 41
-"""A curve has at most so many samples; of a file's longer ones an evenly spread part is proposed."""
+"""A curve has room for so many samples; of a file's longer ones an evenly spread part is proposed."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,10 +41,12 @@ class Limits:
     Attributes:
         steepest: Largest zenith angle of light and sensor, degrees.
         retro: The sensor stands in the light within this angle of it, degrees.
+        in_plane: Whether the sensor stays in the plane of incidence.
     """
 
     steepest: float = 85.0
     retro: float = 5.0
+    in_plane: bool = False
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -103,6 +105,8 @@ def proposed(fit: Fit, kind: Measured, limits: Limits) -> Candidates:
     cosine = np.clip(np.einsum("kmi,kmi->km", wi, wo), -1.0, 1.0)
     allowed = every.used & (np.abs(every.theta_o) <= steepest + 1e-9)
     allowed &= np.arccos(cosine) >= np.deg2rad(limits.retro) - 1e-9
+    if limits.in_plane:
+        allowed &= np.abs(np.sin(every.phi))[:, None] < 1e-9
     kept = allowed.any(axis=1)
     parts["used"] = allowed
     return Candidates(**{name: part[kept] for name, part in parts.items()})
@@ -127,5 +131,6 @@ def _scans(fit: Fit, zenith: np.ndarray) -> Candidates:
     )
     scan = longest[np.unique(np.linspace(0, len(longest) - 1, SCAN).astype(int))]
     light, phi = (part.ravel() for part in np.meshgrid(zenith, [np.pi, np.pi / 2], indexing="ij"))
-    theta_o = np.tile(scan, (len(light), 1))
-    return Candidates(light, np.zeros(len(light)), theta_o, phi, np.ones(theta_o.shape, bool))
+    used = np.tile(np.arange(SCAN) < len(scan), (len(light), 1))
+    theta_o = np.tile(np.r_[scan, np.zeros(SCAN - len(scan))], (len(light), 1))
+    return Candidates(light, np.zeros(len(light)), theta_o, phi, used)

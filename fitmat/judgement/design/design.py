@@ -20,7 +20,7 @@ from fitmat import arguments
 from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
 from fitmat.judgement.design.candidates import Candidates, Limits, Measured, proposed
-from fitmat.judgement.design.filters import Bank, Task, bank, scores
+from fitmat.judgement.design.filters import Bank, Task, bank, scores, unmeasured
 from fitmat.measurements.noise import channel_laws
 from fitmat.text import brief
 from fitmat.uncertainty.posterior import Posterior
@@ -34,6 +34,9 @@ MATCH = "match"
 
 MOST_STEPS = 8
 """So many measurements are planned at most: all steps share one program."""
+
+ROOM = {"sample": 4096, "curve": 64}
+"""Candidates that a program has room for, or twice as many and so on: instruments and lobes share it."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -153,9 +156,9 @@ def next_angles(
     proposals: list[Proposal] = []
     gains = np.zeros(0)
     wider = np.sqrt(fit.correlation.inflation)
-    before, start = _expected(banks, task, looked, history, blank=True)
+    before, start = unmeasured(banks[0], task)
     for _ in range(count):
-        score, sd = _expected(banks, task, looked, history)
+        score, sd = _expected(banks, task, looked, history, ROOM[kind])
         score = np.where(looked.near(history, APART), -np.inf, score)
         gain = np.sqrt(np.maximum(score, 0.0)) if match else np.exp(score - before)
         best = int(np.argmax(score))
@@ -164,8 +167,7 @@ def next_angles(
         before = score[best]
         history.append(best)
     truths = np.asarray(banks[0].centre)[np.asarray(banks[0].truths)]
-    sd = wider * np.sqrt(np.mean(start[0] ** 2, axis=0))
-    known = (fit, fits[-1] if match else None, target, kind, fit.coordinates.names, sd, truths)
+    known = (fit, fits[-1] if match else None, target, kind, fit.coordinates.names, wider * start, truths)
     return Design(*known, tuple(proposals), looked, gains)
 
 
@@ -204,17 +206,20 @@ def _proposal(looked: Candidates, best: int, repeats: int, gain: float, sd_if: n
 
 
 def _expected(
-    banks: tuple[Bank, ...], task: Task, looked: Candidates, history: list[int], *, blank: bool = False
+    banks: tuple[Bank, ...], task: Task, looked: Candidates, history: list[int], room: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Score of every candidate after those of the history, (k,), and the sd it leaves for each truth, (k, t, f).
-
-    With `blank` no sample of any candidate is taken.
-    """
+    """Score of every candidate after those of the history, (k,), and the sd it leaves for each truth, (k, t, f)."""
     wi, wo = looked.directions()
+    count = len(wi)
+    while room < count:
+        room *= 2
     past = np.zeros((MOST_STEPS, looked.used.shape[1]), bool)
     rows = np.zeros(MOST_STEPS, int)
     rows[: len(history)] = history
     past[: len(history)] = looked.used[history]
-    given = (wi, wo, looked.used & (not blank)), (wi[rows], wo[rows], past)
-    score, sd = scores(banks, task, *given)
-    return np.asarray(score), np.asarray(sd)
+    every = tuple(
+        np.concatenate([part, np.tile(part[:1], (room - count, *[1] * (part.ndim - 1)))])
+        for part in (wi, wo, looked.used)
+    )
+    score, sd = scores(banks, task, every, np.asarray(count), (wi[rows], wo[rows], past))
+    return np.asarray(score)[:count], np.asarray(sd)[:count]

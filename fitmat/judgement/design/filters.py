@@ -60,14 +60,28 @@ def bank(fit: Fit) -> Bank:
     return Bank(fit.model, fit.values, fit.coordinates, fit.data.loss, *arrays)
 
 
+def unmeasured(filters: Bank, task: Task) -> tuple[float, Float[np.ndarray, " f"]]:
+    """The score of measuring nothing, and the sd that is left then, natural."""
+    weight = np.exp(filters.logs)
+    apart = filters.centre - weight @ filters.centre
+    spread = np.einsum("e,eij->ij", weight, filters.covariance) + np.einsum("e,ei,ej->ij", weight, apart, apart)
+    variance = np.diagonal(spread)
+    if task.match is not None:
+        return 0.0, np.sqrt(variance)
+    if task.wanted:
+        return -0.5 * float(np.mean(np.log(variance[list(task.wanted)]))), np.sqrt(variance)
+    return -0.5 * float(np.linalg.slogdet(spread)[1]) / len(variance), np.sqrt(variance)
+
+
 @program
-def scores(banks: tuple[Bank, ...], task: Task, candidates: Any, history: Any) -> tuple[Array, Array]:
+def scores(banks: tuple[Bank, ...], task: Task, candidates: Any, count: Any, history: Any) -> tuple[Array, Array]:
     """Score of every candidate (k,), larger is better, and the sd it leaves for each truth, natural, (k, t, f).
 
     Args:
         banks: Of one model, or of two for the match.
         task: What is asked.
         candidates: Directions to the light and the sensor (k, m, 3) and which samples there are (k, m).
+        count: How many of them there are; what stands behind is of no meaning.
         history: The same of what is measured before, (h, m, 3) and (h, m).
     """
     # For "match" the model that needs less discrepancy is the truth, and the other is asked how far off it is.
@@ -87,7 +101,7 @@ def scores(banks: tuple[Bank, ...], task: Task, candidates: Any, history: Any) -
             return -0.5 * jnp.mean(jnp.log(jnp.mean(sd**2, axis=0)[np.array(task.wanted)])), sd
         return -0.5 * jnp.mean(jnp.linalg.slogdet(spread)[1]) / sd.shape[1], sd
 
-    return mapped(one, candidates)
+    return mapped(one, candidates, count)
 
 
 def _ready(filters: Bank, truths: int) -> tuple:
