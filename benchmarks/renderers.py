@@ -1,6 +1,7 @@
 """What is exported, executed: how far its values are from the model's own; writes the table of docs/exports.md.
 
-`python benchmarks/renderers.py`; needs Chromium, glslangValidator, Mitsuba, the wheel MaterialX and Blender.
+`python benchmarks/renderers.py`; needs Chromium, glslangValidator, Mitsuba, the wheels MaterialX and
+pyradiance, and Blender.
 """
 
 import sys
@@ -73,13 +74,13 @@ APPROXIMATED = {
 def approximated() -> list[list[str]]:
     """Rows of the targets that get the closest material: its values, run there, beside the model's own."""
     rows = []
-    for target in ("materialx", "openpbr", "gltf", "usd", "blender", "osl"):
+    for target in ("materialx", "openpbr", "gltf", "usd", "radiance", "blender", "osl"):
         for name, model in APPROXIMATED.items():
             what, made = Chosen(model), TARGETS[target]
             form = made.translate(what)
             found = made.difference(what, form)
             if found is None:
-                sys.exit(f"{target} is not run here: needs the wheel MaterialX, or Blender; the table stays as it is")
+                sys.exit(f"{target} is not run here, see what is needed above; the table stays as it is")
             closest = made.facts(form).get("closest")
             said = f"ΔE2000 {closest['delta_e']:.2f}" if closest else "the same"
             executed = "its formulas, no viewer" if target in ("gltf", "usd") else "yes"

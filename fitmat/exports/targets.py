@@ -15,6 +15,7 @@ from fitmat.exports import (
     materialx_shader,
     mitsuba,
     osl,
+    radiance,
     shaders,
     table,
     translation,
@@ -118,6 +119,9 @@ TARGETS = {
         materialx.facts,
     ),
     "usd": Target("OpenUSD's UsdPreviewSurface", usd.translated, usd.texts, usd.difference, _words, _facts),
+    "radiance": Target(
+        "Radiance's plastic or metal", radiance.translated, radiance.texts, radiance.difference, _words, _facts
+    ),
     "blender": Target(
         "Blender's Principled BSDF, in Cycles 5.0",
         blender.translated,
