@@ -80,6 +80,18 @@ def plot(
     process.say("\n".join(visible(str(path)) for path in written))
 
 
+@app.command(cls=Command)
+def cite(
+    result: ResultFlag,
+) -> None:
+    """Print BibTeX of fitmat and of every model and method that a run used."""
+    process.set_up()
+    from fitmat.studies.citations import bibtex
+    from fitmat.studies.result import load
+
+    process.say(bibtex(load(result).record))
+
+
 @app.command(cls=Command, epilog=examples.EXPORT)
 def export(
     result: ResultFlag,

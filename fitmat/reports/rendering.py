@@ -27,6 +27,7 @@ from fitmat.reports import ball, drawings
 from fitmat.reports.rows import brief_rows, parameter_rows, prior_rows
 from fitmat.reports.snippets import snippets
 from fitmat.studies.cards import best, cards, ordered, title
+from fitmat.studies.citations import bibtex
 from fitmat.text import visible_in
 from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAIL_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS
 
@@ -77,6 +78,7 @@ def to_html(record: Mapping[str, Any], figures: Mapping[str, Any]) -> str:
             figures=drawn,
             cards=cards(told),
             best=best(told),
+            cite=bibtex(told),
             fits=ordered(told),
             policy=POLICY.format(hashes),
             scripts=[Markup(script) for script in scripts],
