@@ -33,6 +33,18 @@ SEVERAL = 2
 BESIDE, TOP = np.deg2rad(45.0), np.deg2rad(8.0)
 """Angle within which it falls so far, and within which nothing is higher."""
 
+NORMAL, BESIDE_NORMAL, LEAST_TOP = np.deg2rad(8.0), 1.5, np.deg2rad(84.0)
+"""A scan of zenith angles comes within so much, or so many steps, of the normal, or does not go so far from it."""
+
+LOWEST = np.deg2rad(45.0)
+"""Of a scan of elevations: where a scan of the zenith angle ends that goes at least as far as its complement."""
+
+HORIZONTAL = np.deg2rad(89.99)
+"""Zenith angle of a direction along the surface."""
+
+SAME = 0.2
+"""Relative difference up to which both sides of a curve agree, as they do about the normal."""
+
 CLEAR = 6.0
 """A peak exceeds the median, and what lies beside it, by so many standard deviations of the noise."""
 
@@ -56,7 +68,7 @@ def with_peak_side(m: Measurements, unsaid_side: Sequence[str]) -> Measurements:
         )
         return dataclasses.replace(m, warnings=(*m.warnings, warning))
     if not back:
-        return _with_plane(m, confirm) or _with_origin(m)
+        return _with_plane(m, confirm) or _with_elevations(m, confirm) or _with_origin(m)
     warning = (
         f"The values peak back towards the light, not in the mirror direction (at {_listed(back)} incidence). Either "
         f"the file counts its angles from the other side: pass {exchange}; or the sample is a retro-reflector: confirm "
@@ -76,6 +88,20 @@ def _with_plane(m: Measurements, confirm: str) -> Measurements | None:
             )
             return dataclasses.replace(m, warnings=(*m.warnings, warning))
     return None
+
+
+def _with_elevations(m: Measurements, confirm: str) -> Measurements | None:
+    """With a warning where both angles look counted from the horizon, which leaves the peak in the mirror direction."""
+    if not upside_down_both(m):
+        return None
+    places = np.rad2deg(_placed(m).theta_o)
+    reach = f"{places.min():.3g}° to {places.max():.3g}°"
+    warning = (
+        f"theta_o goes from {reach}, to the horizon and not to the normal: it and theta_i look like elevations above "
+        "the surface. If they are, say so by their names, --columns elevation_i=theta_i,elevation_o=theta_o; if not, "
+        f"confirm with {confirm}."
+    )
+    return dataclasses.replace(m, warnings=(*m.warnings, warning))
 
 
 def _with_origin(m: Measurements) -> Measurements:
@@ -105,6 +131,35 @@ def upside_down(m: Measurements) -> tuple[float, ...]:
     """The same where they peak at 90° less the mirror angle, on either side, far from the mirror direction."""
     found = [_peaking(m, lambda theta_i, side=side: side * (np.pi / 2 - theta_i)) for side in (1.0, -1.0)]
     return max(found, key=len)
+
+
+def upside_down_both(m: Measurements) -> bool:
+    """Whether the sensor reaches the horizon, where nothing can be read, or both sides agree there as at the normal.
+
+    A scan of the zenith angle begins at the normal, or half a step beside it; of the elevation it ends there.
+    """
+    placed = _placed(m)
+    places = np.unique(np.round(placed.theta_o, 4))
+    if len(places) < 5 or placed.theta_i.min() < NORMAL:
+        return False
+    step, low, top = float(np.median(np.diff(places))), places[0], places[-1]
+    if not max(NORMAL, BESIDE_NORMAL * step) <= low <= LOWEST or top < max(LEAST_TOP, np.pi / 2 - 0.75 * step):
+        return False
+    return bool(top > HORIZONTAL) or _same_at(m, top)
+
+
+def _placed(m: Measurements) -> Measurements:
+    """The rows that are used, and those at the horizon."""
+    return m.rows(np.flatnonzero(m.valid.any(axis=1) | (np.maximum(m.theta_i, m.theta_o) > HORIZONTAL)))
+
+
+def _same_at(m: Measurements, top: float) -> bool:
+    """Whether the values of both sides agree at one zenith angle of the sensor, at every incidence."""
+    ends = [(value[np.abs(angle - top) < 1e-3], value[np.abs(angle + top) < 1e-3]) for _, angle, value in _in_plane(m)]
+    return bool(ends) and all(
+        one.size and other.size and abs(one[0] - other[0]) < SAME * max(abs(one[0]), abs(other[0]))
+        for one, other in ends
+    )
 
 
 def beside(m: Measurements, azimuth: float) -> tuple[float, ...]:

@@ -9,8 +9,10 @@ import numpy as np
 
 from fitmat.errors import ReadError
 from fitmat.maths.directions import mirror
+from fitmat.measurements.blocked import SEVERAL
 from fitmat.measurements.options import Options
 from fitmat.measurements.samples import Measurements
+from fitmat.text import visible
 
 MOST_NEGATIVE = 0.6
 """Noise about zero makes half of the values negative; from this share on, and three standard deviations of a fair coin
@@ -32,6 +34,9 @@ BRIGHTEST = 2.0
 LOUD = 2.0
 """Times its value that a σ is, in the middle one, where the file does not hold noise alone, or σ in percent."""
 
+GAP = 10.0
+"""Times a smallest value that occurs several times, within which there is no other: it is a limit, not the darkest."""
+
 COMPARED = ("reflectance_factor", "panel_ratio")
 """Quantities that are 1 for a perfect white surface."""
 
@@ -52,7 +57,27 @@ def refuse_implausible(m: Measurements, quantity: str, options: Options) -> None
 
 
 def with_doubts(m: Measurements) -> Measurements:
-    """The measurements, with a warning where σ can hardly be that of the values."""
+    """The measurements, with warnings where σ can hardly be that of the values, and where a limit cut them off."""
+    return _with_limit(_with_percent(m))
+
+
+def _with_limit(m: Measurements) -> Measurements:
+    for k, name in enumerate(m.channels):
+        value = m.value[m.valid[:, k], k]
+        smallest = float(value.min(initial=np.inf))
+        count = int(np.count_nonzero(value == smallest))
+        if SEVERAL <= count <= len(value) // 2 and 0 < smallest < value[value > smallest].min() / GAP:
+            of = f" of channel {visible(name)}" if len(m.channels) > 1 else ""
+            warning = (
+                f"The smallest value{of}, {smallest:.3g} sr⁻¹, "
+                f"occurs exactly {count} times, and nothing else is below {GAP:g} times it. If the light was blocked "
+                "there, or the instrument at its limit, leave those rows out."
+            )
+            m = dataclasses.replace(m, warnings=(*m.warnings, warning))
+    return m
+
+
+def _with_percent(m: Measurements) -> Measurements:
     if m.sigma is None or not m.valid.any():
         return m
     typical = float(np.median(m.sigma[m.valid] / np.maximum(np.abs(m.value[m.valid]), np.finfo(float).tiny)))

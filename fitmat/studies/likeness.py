@@ -27,7 +27,7 @@ Record = Mapping[str, Any]
 def likeness(fit: Mapping[str, Any]) -> tuple[str, list[str]]:
     """What a fit of the record is like: "satin plastic" or "", and the numbers that say so."""
     told = {**fit["derived"], **fit["parameters"]}
-    return _kind(told), [*_diffuse(told), *_mirror(told), *_width(told)]
+    return _kind(told), [*_diffuse(told), *_mirror(told), *_width(told)] or _others(fit["parameters"])
 
 
 def listed(value: Any) -> list[Any]:
@@ -83,6 +83,13 @@ def _width(told: Record) -> list[str]:
             beside = [] if across is None else [f"αy {across['value']:.3g}"]
             return [f"{letter} {_shortly(found['value'], sd)}", *beside]
     return []
+
+
+def _others(told: Record) -> list[str]:
+    """Three at most of the parameters of a model that has none of the usual ones."""
+    usual = {"kd", "ks", "alpha", "alpha_x", "exponent", "eta"} & told.keys()
+    sure = {} if usual else {name: q for name in told if name != "discrepancy" and (q := _sure(told, name))}
+    return [f"{name} {_shortly(q['value'], q['sd'])}" for name, q in sure.items() if isinstance(q["sd"], float)][:3]
 
 
 def _shortly(value: float, sd: float) -> str:

@@ -127,6 +127,15 @@ def elevation_of_the_sensor(t: Table, rng: np.random.Generator) -> None:
         elevation_by_name(t, rng)
 
 
+def elevations_of_both(t: Table, rng: np.random.Generator) -> None:
+    """Their names say zenith; without an azimuth an elevation has no sign."""
+    if "phi" in t.angles:
+        _angle(t, "theta_i", 90.0 - t.angles["theta_i"])
+        _angle(t, "theta_o", 90.0 - t.angles["theta_o"])
+    else:
+        elevation_by_name(t, rng)
+
+
 def light_on_the_negative_side(t: Table, rng: np.random.Generator) -> None:
     if "phi" in t.angles:
         mirrored_azimuth(t, rng)
@@ -192,6 +201,17 @@ def sentinels(t: Table, rng: np.random.Generator) -> None:
     _values(t, [mark if lost else cell for cell, lost in zip(t.written[t.quantity], t.lost, strict=True)])
 
 
+def blocked_readings(t: Table, rng: np.random.Generator) -> None:
+    """A few neighbours of one curve, all of one tiny value: the dark level of the instrument."""
+    first = rng.integers(0, len(t.value) - 12)
+    run = np.arange(first, first + rng.integers(3, 13))
+    t.lost[run[t.angles["theta_i"][run] == t.angles["theta_i"][run[0]]]] = True
+    if t.lost.sum() < 3:
+        t.lost[run[0] - 3 : run[0] + 1] = True
+    mark = str(rng.choice(["1e-06", "0.00001", "0.0001"]))
+    _values(t, [mark if lost else cell for cell, lost in zip(t.written[t.quantity], t.lost, strict=True)])
+
+
 def words_for_nothing(t: Table, rng: np.random.Generator) -> None:
     """In the first column as well, as spreadsheets write them."""
     mark = str(rng.choice(["NA", "NaN", "#N/A", "#DIV/0!", "", "n/a", "--"]))
@@ -251,6 +271,7 @@ KINDS: tuple[Callable[[Table, np.random.Generator], None], ...] = (
     *(azimuth_in_radians, everything_in_radians, radians_in_the_header, a_whole_turn, elevation_by_name),
     *(
         elevation_of_the_sensor,
+        elevations_of_both,
         light_on_the_negative_side,
         mirrored_azimuth,
         turned_azimuth,
@@ -263,6 +284,7 @@ KINDS: tuple[Callable[[Table, np.random.Generator], None], ...] = (
         thousands,
         decimal_commas,
         sentinels,
+        blocked_readings,
         words_for_nothing,
         typographic_signs,
         fortran,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fitmat as fm
-from fitmat.measurements.blocked import REASON
+from fitmat.measurements.blocked import EQUAL, REASON
 
 ANGLES = np.arange(-80.0, 81.0, 2.0)
 X = np.deg2rad(ANGLES)
@@ -78,3 +78,36 @@ def test_several_curves_are_judged_one_by_one() -> None:
     )
     assert np.count_nonzero(falls == 0) > 0
     assert m.valid.all()
+
+
+@pytest.mark.parametrize("name", BLOCKED)
+@pytest.mark.parametrize("limit", [1e-6, 1e-3])
+def test_equal_tiny_readings_are_masked_as_zeros_are(name: str, limit: float) -> None:
+    """What is written where nothing was seen; a single one, or a limit close to the rest, tells nothing."""
+    value = np.where(BLOCKED[name] == 0, limit, BLOCKED[name])
+    m = kept(value)
+    if np.count_nonzero(value == limit) < 3:
+        assert m.valid.all()
+    else:
+        np.testing.assert_array_equal(m.valid[:, 0], value != limit)
+        assert m.masked == {EQUAL: np.count_nonzero(value == limit)}
+        assert m.value[~m.valid[:, 0]].max() == 0.0
+
+
+@pytest.mark.parametrize("name", READINGS)
+def test_a_limit_that_a_curve_reaches_is_kept(name: str) -> None:
+    assert kept(np.maximum(READINGS[name], 1e-6)).valid.all()
+
+
+def test_a_limit_beside_a_steep_flank_is_kept_and_said() -> None:
+    """Whether a lobe falls so far from one angle to the next, nobody knows."""
+    lobe = 0.1 + 5.0 * np.exp(-(((X - 0.5) / 0.06) ** 2))
+    m = kept(np.where(X > 0.59, 1e-6, lobe))
+    assert m.valid.all()
+    (warning,) = m.warnings
+    count = np.count_nonzero(X > 0.59)
+    assert (
+        f"The smallest value, 1e-06 sr⁻¹, occurs exactly {count} times, and nothing else is below 10 times" in warning
+    )
+    assert kept(lobe).warnings == ()
+    assert kept(np.where(X > -0.2, lobe, 0.1)).warnings == ()  # without noise a floor is one value many times

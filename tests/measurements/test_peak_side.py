@@ -156,3 +156,37 @@ def test_an_elevation_beside_a_zenith_angle_is_noticed(elevated: str) -> None:
     assert fm.read({**angles, "brdf": value}).warnings == ()
     (warning,) = fm.read({**angles, elevated: 90 - angles[elevated], "brdf": value}).warnings
     assert "looks like an elevation above the surface" in warning
+
+
+def elevated(step: float, first: float, mirror: float = 180.0) -> dict[str, np.ndarray]:
+    """Curves on both sides of the normal, in zenith angles from `first` on."""
+    sensor = np.arange(first, 76.0, step)
+    columns = (part.ravel() for part in np.meshgrid(INCIDENCES, sensor, [0.0, 180.0], indexing="ij"))
+    theta_i, theta_o, phi = columns
+    value = gaussian(theta_i, np.where(phi == mirror, theta_o, -theta_o), 1.0)
+    return {"theta_i": theta_i, "theta_o": theta_o, "phi": phi, "brdf": value}
+
+
+@pytest.mark.parametrize(("step", "first"), [(5.0, 0.0), (5.0, 2.5), (2.5, 0.0)])
+def test_two_elevations_are_said_with_the_flag_that_mends_them(step: float, first: float):
+    """Both angles from the horizon: the peak stays in the mirror direction."""
+    right = elevated(step, first)
+    wrong = right | {name: 90.0 - right[name] for name in ("theta_i", "theta_o")}
+    (warning,) = fm.read(wrong).warnings
+    assert "to the horizon and not to the normal: it and theta_i look like elevations above the surface" in warning
+    assert "--columns elevation_i=theta_i,elevation_o=theta_o; if not, confirm with --specular-azimuth 180" in warning
+    mended = fm.read(wrong, columns="elevation_i=theta_i,elevation_o=theta_o")
+    assert mended.warnings == fm.read(right).warnings == fm.read(wrong, specular_azimuth=180).warnings == ()
+    np.testing.assert_allclose(mended.wo, fm.read(right).wo, atol=1e-12)
+
+
+def test_a_scan_of_grazing_angles_raises_no_alarm():
+    """From 30° to 87.5°, where both sides differ, and a model's table to 90°, which begins a step from the normal."""
+    sensor = np.arange(30.0, 88.0, 2.5)
+    columns = (part.ravel() for part in np.meshgrid([60.0, 75.0, 80.0], sensor, [0.0, 180.0], indexing="ij"))
+    theta_i, theta_o, phi = columns
+    value = gaussian(theta_i, np.where(phi == 180.0, theta_o, -theta_o), 1.0)
+    assert fm.read({"theta_i": theta_i, "theta_o": theta_o, "phi": phi, "brdf": value}).warnings == ()
+    table = elevated(10.0, 10.0)
+    table["theta_o"] = np.where(table["theta_o"] == 70.0, 90.0, table["theta_o"])
+    assert fm.read(table).warnings == ()

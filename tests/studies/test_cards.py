@@ -103,6 +103,11 @@ def test_a_plastic_is_told_in_three_sentences() -> None:
             "GGX: its parameters are not determined.",
         ),
         (
+            {"a": quantity(0.003014, 0.000074), "b": quantity(0.0008, 0.1, "not determined"), "g": quantity(1.7, 0.01)},
+            {},
+            "GGX: a 0.00301 ± 0.00007, g 1.70 ± 0.01 (GGX).",
+        ),
+        (
             {"kd": quantity(0.2), "ks": quantity(0.06), "exponent": quantity(40.0, 0.5)},
             {},
             "specular weight 0.06, exponent 40.0 ± 0.5",
