@@ -68,7 +68,7 @@ EXPORT = (
     "  glsl-330: the same for desktop OpenGL\n\n"
     "  mitsuba: NAME.py, the dictionary; NAME.xml, a scene to include\n\n"
     "  materialx: NAME.mtlx, standard nodes or OpenPBR; openpbr: the closest OpenPBR surface\n\n"
-    "  gltf: NAME.gltf, usd: NAME.usda, radiance: NAME.rad, the closest material that it can hold\n\n"
+    "  gltf: NAME.gltf, usd: NAME.usda, pbrt: NAME.pbrt, radiance: NAME.rad, the closest material that it can hold\n\n"
     "  blender: NAME.py, which makes the closest Principled BSDF; osl: NAME.osl, a shader of closures\n\n"
     "  zemax: NAME.bsdf, or one for each channel\n\n"
     "  table: NAME.csv, NAME.parquet, NAME.json\n\n"

@@ -15,6 +15,7 @@ from fitmat.exports import (
     materialx_shader,
     mitsuba,
     osl,
+    pbrt,
     radiance,
     shaders,
     table,
@@ -67,6 +68,11 @@ def _words(chosen: Chosen, found: Closest) -> Sequence[str]:
     """Of a target that always gets the closest of its materials."""
     del chosen
     return found.words
+
+
+def _unexecuted(chosen: Chosen, found: Any) -> None:
+    """Of a target that nothing runs."""
+    del chosen, found
 
 
 def _facts(found: Closest) -> Mapping[str, Any]:
@@ -122,6 +128,7 @@ TARGETS = {
     "radiance": Target(
         "Radiance's plastic or metal", radiance.translated, radiance.texts, radiance.difference, _words, _facts
     ),
+    "pbrt": Target("pbrt-v4", pbrt.translated, pbrt.texts, _unexecuted, pbrt.notes, _facts),
     "blender": Target(
         "Blender's Principled BSDF, in Cycles 5.0",
         blender.translated,

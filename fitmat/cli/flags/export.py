@@ -14,8 +14,8 @@ TargetFlag = Annotated[
     str,
     typer.Option(
         "--to",
-        help="What it is written for: glsl, glsl-330, mitsuba, materialx, openpbr, gltf, usd, radiance, blender, "
-        "osl, zemax, table, merl.",
+        help="What it is written for: glsl, glsl-330, mitsuba, materialx, openpbr, gltf, usd, pbrt, radiance, "
+        "blender, osl, zemax, table, merl.",
         metavar="TARGET",
     ),
 ]
