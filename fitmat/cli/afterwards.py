@@ -17,12 +17,13 @@ from fitmat.cli.flags.export import (
     OneModelFlag,
     ReplaceExportFlag,
     ResultFlag,
+    ResultsFlag,
     StepFlag,
     StrictFlag,
     TableThetaIFlag,
     TargetFlag,
 )
-from fitmat.cli.flags.files import ReplacePageFlag
+from fitmat.cli.flags.files import ComparedPageFlag, ReplacePageFlag
 from fitmat.cli.flags.fitting import MaskingFlag
 from fitmat.cli.flags.given import Command
 from fitmat.cli.flags.models import CheckFlag, NameFlag
@@ -78,6 +79,21 @@ def plot(
     told = {"channel": 0 if channel is None else channel, "model": model, "width_mm": width, "force": force}
     written = paper.save(load(result), out, what, **told)
     process.say("\n".join(visible(str(path)) for path in written))
+
+
+@app.command(cls=Command, epilog=examples.COMPARE)
+def compare(
+    results: ResultsFlag,
+    out: ComparedPageFlag = Path("compare.html"),
+    force: ReplacePageFlag = False,
+) -> None:
+    """Put runs side by side: their answers, parameters, matches and curves, here and as one page."""
+    process.set_up()
+    from fitmat.cli import compare
+    from fitmat.reports import comparison
+
+    found = comparison.compare_runs(results)
+    compare.show(found, comparison.write(found, out, force=force))
 
 
 @app.command(cls=Command)

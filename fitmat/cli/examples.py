@@ -79,6 +79,10 @@ EXPORT = (
     "  fitmat export run1 --to table --theta-i 10,30,60 --step 2"
 )
 
+COMPARE = (
+    "Examples:\n\n  fitmat compare run1 run2 run3\n\n  fitmat compare before-fitmat after-fitmat --out polished.html"
+)
+
 PLOT = (
     "Examples:\n\n  fitmat plot run1 --what curves --out fit.pdf\n\n"
     "  fitmat plot run1 --what residuals --channel g --width 178 --out residuals.svg"

@@ -58,6 +58,7 @@ def parameter_rows(fit: Record, channels: Sequence[str]) -> list[dict[str, Any]]
                         "interval": interval(low, high, sd) if free else "",
                         "ends": (low, high) if free else None,
                         "best": value,
+                        "sd": sd,
                         "unit": "" if q["unit"] == "1" else q["unit"],
                         "remark": remark,
                         "doc": q["doc"],

@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+ResultsFlag = Annotated[list[Path], typer.Argument(help="Folders of two runs of fitmat fit, or more.", metavar="RUN…")]
+
 ResultFlag = Annotated[Path, typer.Argument(help="Folder of a run of fitmat fit, or the fit.json in it.")]
 
 TargetFlag = Annotated[

@@ -46,6 +46,8 @@ OutFlag = Annotated[
 
 ReplacePageFlag = Annotated[bool, typer.Option("--force", help="Replace the page that is there.")]
 
+ComparedPageFlag = Annotated[Path, typer.Option(help="The page, one file.", metavar="FILE")]
+
 ForceFlag = Annotated[bool, typer.Option("--force", help="Replace the report of an earlier run in --out.")]
 
 OpenFlag = Annotated[bool, typer.Option("--open", help="Open the report in a browser when it is written.")]
