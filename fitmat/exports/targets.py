@@ -25,6 +25,7 @@ from fitmat.exports import (
     zemax,
 )
 from fitmat.exports.closest import Closest
+from fitmat.exports.game_engines import UNITY, UNREAL
 from fitmat.exports.material import Chosen
 from fitmat.exports.verification import Difference
 
@@ -129,6 +130,8 @@ TARGETS = {
         "Radiance's plastic or metal", radiance.translated, radiance.texts, radiance.difference, _words, _facts
     ),
     "pbrt": Target("pbrt-v4", pbrt.translated, pbrt.texts, _unexecuted, pbrt.notes, _facts),
+    "unreal": Target("Unreal Engine's Default Lit", UNREAL.translated, UNREAL.texts, UNREAL.difference, _words, _facts),
+    "unity": Target("Lit of Unity's URP", UNITY.translated, UNITY.texts, UNITY.difference, _words, _facts),
     "blender": Target(
         "Blender's Principled BSDF, in Cycles 5.0",
         blender.translated,
