@@ -22,6 +22,7 @@ from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.losses import DEFAULT, Loss
 from fitmat.fitting.stabilising import spread
 from fitmat.maths.arrays import library
+from fitmat.measurements.horizon import with_horizon
 from fitmat.measurements.noise import Noise, levels
 from fitmat.measurements.samples import Measurements
 from fitmat.models.around.noise import Noisy
@@ -92,11 +93,12 @@ class Data(eqx.Module):
 def prepare(m: Measurements, noise: Noise, prior: Prior | None = None, loss: Loss = DEFAULT) -> Data:
     """Measurements and their noise, ready for the likelihood.
 
-    Rows with nothing valid are left out; what the loss cannot be applied to has weight 0; rows of weight 0 fill up to
-    `padded_length`, so that files of similar size share compiled programs.
+    Rows with nothing valid are left out, and values at θ_o = 90° under all but an objective; what the loss cannot be
+    applied to has weight 0; rows of weight 0 fill up to `padded_length`, so that files of similar size share programs.
     """
+    m, sigma = (m, noise.sigma) if loss.posterior else with_horizon(m, noise.sigma)
     keep = np.flatnonzero(m.valid.any(axis=1))
-    m, sigma = m.rows(keep), noise.sigma[keep]
+    m, sigma = m.rows(keep), sigma[keep]
     kappa = m.wi[:, 2:3]
     weight = m.valid if loss.usable is None else m.valid & loss.usable(m)
     parts = (m.wi, m.wo, m.value * kappa, sigma * kappa, kappa, weight.astype(float))

@@ -102,7 +102,7 @@ def _few(chunks: Stream, known: Scatter, pairs: Iterable[tuple[Measurements, Noi
         done += chunk.n_samples
     wi, wo, value, valid = (np.concatenate([getattr(m, name) for m in some]) for name in ("wi", "wo", "value", "valid"))
     sigma = np.concatenate(sigmas)
-    m = dataclasses.replace(chunks.part, wi=wi, wo=wo, value=value, valid=valid, sigma=sigma)
+    m = dataclasses.replace(chunks.part, wi=wi, wo=wo, value=value, valid=valid, sigma=sigma, horizontal=None)
     held = Held(m, m.n_samples, m.n_valid, chunks.part, thinning)
     return Rows(held, known, tuple(blocks(m, measured_noise(m))))
 

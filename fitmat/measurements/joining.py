@@ -72,7 +72,15 @@ def join(parts: Sequence[Measurements]) -> Measurements:
         instrument=parts[0].instrument,
         warnings=_told([part.warnings for part in parts], names),
         stated=tuple(stated for part in parts for stated in part.stated),
+        horizontal=_horizontal(parts, order),
     )
+
+
+def _horizontal(parts: Sequence[Measurements], order: list[list[int]]) -> np.ndarray | None:
+    if all(part.horizontal is None for part in parts):
+        return None
+    each = [np.full(part.value.shape, np.nan) if part.horizontal is None else part.horizontal for part in parts]
+    return np.concatenate([one[:, places] for one, places in zip(each, order, strict=True)])
 
 
 def refuse_twice(sources: Sequence[Any]) -> None:

@@ -30,6 +30,7 @@ from fitmat.measurements.formats import (
     utia,
     zemax,
 )
+from fitmat.measurements.horizon import along
 from fitmat.measurements.instrument import IDEAL, Instrument
 from fitmat.measurements.options import Options
 from fitmat.measurements.parsing import cells, contents, frames, tabular
@@ -190,6 +191,7 @@ def measured(recording: Recording, options: Options) -> Measurements:
         value = recording.value * scale
         sigma = None if recording.sigma is None else recording.sigma * scale
     usable = np.isfinite(value) if sigma is None else np.isfinite(value) & np.isfinite(sigma) & (sigma > 0)
+    flat = along(recording) & (recording.quantity != "brdf_cos")  # whose value at 90° is 0/0
     extreme = valid & ~usable
     if extreme.any():
         masked |= {"too large or too small a number in sr⁻¹": int(extreme.any(axis=1).sum())}
@@ -206,6 +208,7 @@ def measured(recording: Recording, options: Options) -> Measurements:
         notes=(note(recording.quantity, options), *recording.notes),
         stated=recording.stated,
         warnings=recording.warnings,
+        horizontal=np.where(flat & np.isfinite(value), value, np.nan) if flat.any() else None,
     )
     return without_blocked(found)
 

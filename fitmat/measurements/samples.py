@@ -68,6 +68,7 @@ class Measurements:
         instrument: What the values owe to the instrument that took them.
         warnings: Plain sentences: what may have been read otherwise than it was meant.
         stated: What the file says that its values add up to.
+        horizontal: Masked values at θ_o = 90°, sr⁻¹, NaN elsewhere, (n, c); None where there are none.
     """
 
     wi: Float[np.ndarray, "n 3"]
@@ -82,6 +83,7 @@ class Measurements:
     instrument: Instrument = IDEAL
     warnings: tuple[str, ...] = ()
     stated: tuple[StatedAlbedo, ...] = ()
+    horizontal: Float[np.ndarray, "n c"] | None = None
 
     __repr__ = brief
 
@@ -93,7 +95,8 @@ class Measurements:
             arguments.kind("one of stated", stated, StatedAlbedo)
         count, columns = len(self.wi) if isinstance(self.wi, np.ndarray) else 0, len(self.channels)
         shapes = {"wi": (count, 3), "wo": (count, 3), "value": (count, columns), "valid": (count, columns)}
-        for name, shape in (shapes | ({} if self.sigma is None else {"sigma": shapes["value"]})).items():
+        beside = ("sigma", "horizontal")
+        for name, shape in (shapes | {n: shapes["value"] for n in beside if getattr(self, n) is not None}).items():
             arguments.kind(name, given := getattr(self, name), np.ndarray)
             if given.shape != shape:
                 got, columns = f"{name} of shape {given.shape}", f"{shape[1]} columns"
@@ -160,10 +163,9 @@ class Measurements:
 
     def rows(self, keep: np.ndarray) -> "Measurements":
         """The rows selected by a mask or by indices; counts of what was masked stay those of the source."""
-        sigma = None if self.sigma is None else self.sigma[keep]
-        return dataclasses.replace(
-            self, wi=self.wi[keep], wo=self.wo[keep], value=self.value[keep], sigma=sigma, valid=self.valid[keep]
-        )
+        names = ("wi", "wo", "value", "sigma", "valid", "horizontal")
+        parts = {name: part[keep] for name in names if (part := getattr(self, name)) is not None}
+        return dataclasses.replace(self, **parts)
 
     def _repr_html_(self) -> str:
         return "<br>".join(html.escape(line) for line in str(self).splitlines())

@@ -8,6 +8,8 @@ import platform
 from importlib.metadata import version
 from typing import Any
 
+import numpy as np
+
 from fitmat.fitting.concluding import RESULTS
 from fitmat.fitting.quantities import UNDETERMINED, Quantity
 from fitmat.fitting.result import Fit
@@ -55,14 +57,17 @@ def to_dict(study: Study, command: str | None = None) -> dict[str, Any]:
 
 
 def _loss_dict(fit: Fit) -> dict[str, Any]:
-    loss, left = fit.loss, fit.measurements.n_valid - fit.n_values
+    loss, flat = fit.loss, fit.measurements.horizontal
+    more = 0 if loss.posterior or flat is None else int(np.isfinite(flat).sum())
+    left = fit.measurements.n_valid + more - fit.n_values
     words = f"{left} values left out: {loss.unusable}." if loss.usable is not None and left > 0 else ""
+    counted = f"{more} values at θ_o = 90° count: {loss.name} takes no cosθ_o." if more > left else ""
     return {
         "name": loss.name,
         "formula": loss.formula,
         "source": loss.source,
         "posterior": loss.posterior,
-        "left_out": words,
+        "left_out": " ".join(filter(None, (words, counted))),
     }
 
 
