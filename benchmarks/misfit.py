@@ -28,9 +28,11 @@ from wrong_truths import FAMILIES, RIGHT, SPLITS, Laboratory, surface
 
 import fitmat as fm
 from fitmat.match.appearance.spheres import SPHERE_DRAWS, perceived
+from fitmat.match.distances import extrapolation
 from fitmat.maths.directions import from_angles
 from fitmat.maths.normal import Z95
 from fitmat.maths.quadrature import lobe_rule
+from fitmat.measurements.incidences import incidences
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.terms.fresnel import f0_from_eta
 from fitmat.models.values import values
@@ -126,7 +128,10 @@ def _quantities(posteriors: list[fm.Posterior]) -> dict[str, Numbers]:
         models = posteriors[0].fit.model, posteriors[1].fit.model
         if sound:
             shuffled = np.r_[0, 1 + np.random.default_rng(0).permutation(len(drawn[1]) - 1)]
-            numbers["match distance"] = _distance(models, (drawn[0], drawn[1][shuffled]))
+            m = posteriors[0].fit.measurements
+            measured = np.deg2rad([group.theta_i_deg for group in incidences(m.wi, m.valid[:, 0], len(m.wi))])
+            beyond = extrapolation(np.deg2rad(RINGS_DEG), measured, len(drawn[0])) if kind == "wide" else None
+            numbers["match distance"] = _distance(models, (drawn[0], drawn[1][shuffled]), beyond)
     return found
 
 
@@ -148,14 +153,17 @@ def _albedos(model: AbstractBRDF, drawn: np.ndarray, degrees: tuple[float, ...])
     return [values(model, drawn, np.broadcast_to(r.wi, r.wo.shape), r.wo)[:, :, 0] @ r.weight for r in rules]
 
 
-def _distance(models: tuple[AbstractBRDF, AbstractBRDF], drawn: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """√(∫∫(f_P − f_M)² c_i c_o / ∫∫ f_M² c_i c_o), as the match has it."""
+def _distance(
+    models: tuple[AbstractBRDF, AbstractBRDF], drawn: tuple[np.ndarray, np.ndarray], beyond: np.ndarray | None
+) -> np.ndarray:
+    """√(∫∫(f_P − f_M)² c_i c_o / ∫∫ f_M² c_i c_o), as the match has it; the difference times `beyond` at each ring."""
     top, bottom = 0.0, 0.0
-    for angle in np.deg2rad(RINGS_DEG):
+    for k, angle in enumerate(np.deg2rad(RINGS_DEG)):
         rule = lobe_rule(angle, 0.1, nodes=NODES)
         wi, ring = np.broadcast_to(rule.wi, rule.wo.shape), np.sin(angle) * np.cos(angle)
         one, other = (values(m, d, wi, rule.wo)[:, :, 0] for m, d in zip(models, drawn, strict=True))
-        top, bottom = top + ring * ((one - other) ** 2 @ rule.weight), bottom + ring * (other**2 @ rule.weight)
+        times = 1.0 if beyond is None else beyond[:, k] ** 2
+        top, bottom = top + times * ring * ((one - other) ** 2 @ rule.weight), bottom + ring * (other**2 @ rule.weight)
     return np.sqrt(top / bottom)
 
 

@@ -43,8 +43,10 @@ Percent of the differences whose 95 % interval holds 0, over all families and qu
 the misfit of every sample were its own, as in a likelihood with an independent discrepancy. Limits: 95 % binomial, of
 as many surfaces (the quantities of one surface are hardly independent).
 
-Interleaved laboratories have almost the same misfit, which cancels in their difference: there, and wherever two
-laboratories share a range, intervals that hold beyond it are wider than the difference needs.
+Interleaved laboratories have almost the same misfit, which cancels in their difference: the likelihood alone, of which
+no honest interval may fall short, covers {alone} % there. An interval is about what another range of incidences gives,
+for a laboratory does not know with whom it will be compared: where two share a range it is wider than their difference
+needs, and one that were as narrow as that would not hold low against high.
 
 {splits}
 
@@ -60,8 +62,12 @@ The same for each family and split; a cell is one of these.
 
 {quantities}
 
-{weak} A misfit that one of the parameters can imitate leaves no residual from which its size could be known; what only
-the other laboratory's incidences show is extrapolated, and its interval is no more than a lower bound.
+{weak}
+
+A misfit that one of the parameters can imitate leaves no residual from which its size could be known. What only the
+other laboratory's incidences show is extrapolated: of the distance of the match the part beyond one's own incidences
+counts as known to a standard deviation of a half, of ΔE nothing is added, and a lobe that was seen at low incidences
+alone has its reflectance, ks·F0, but hardly ks and eta apart.
 
 ## The right model
 
@@ -95,6 +101,7 @@ def write(found: Sequence[Line], out: Path, options: str) -> None:
         noise="1 % + 5e-4 sr⁻¹",
         families="\n".join(f"- **{name}**: {words}" for name, words in FAMILIES.items()),
         verdict=_verdict(wrong, right),
+        alone=f"{_percent(_of(wrong, split='interleaved'), 'plain'):.1f}",
         splits=_table(("split", "surfaces", "covered", "if independent", "times wider, median"), _by_split(wrong)),
         cells=_table(("family", *SPLITS), _by_cell(wrong)),
         quantities=_table(("quantity", *SPLITS, "if independent, all splits"), _by_quantity(wrong)),

@@ -27,6 +27,14 @@ COARSE = (24, 12)
 WITHIN = np.deg2rad(2.5)
 """An incidence so near to one that was measured is not beyond it."""
 
+EXTRAPOLATED = 0.5
+"""Relative standard deviation of a difference at incidences smaller or larger than all that were measured.
+
+Two models that follow the same readings differ beyond them by how each goes on, and one of the two at least goes wrong
+there, of which no draw of its parameters knows. Whoever measures there fits both anew, and finds of the difference
+anything from nothing to twice as much: the least that holds what a laboratory finds of another's range of incidences.
+"""
+
 ANGLES = np.deg2rad(np.arange(0.0, 86.0, 5.0))
 """Incidence angles of all curves against incidence, radians."""
 
@@ -77,7 +85,7 @@ def measure_distances(
         first: Its shapes and static choices; mounts and instruments are taken away.
         second: The same; its lobe, as wide as in the first row of `draws`, says where the regions are.
         draws: Parameters of both.
-        measured: Incidence angles for `Distances.measured`, radians.
+        measured: Incidence angles for `Distances.measured`, radians; beyond them a difference is known to a factor.
     """
     theta, solid = incidence_panels()
     nodes = np.concatenate([theta, measured, ANGLES])
@@ -87,6 +95,8 @@ def measure_distances(
     of_lobe = min(w.min() for w in every), every[1][0]
     best = _integrals(_first(pair), nodes, of_lobe, (ZENITH_NODES, AZIMUTH_NODES))
     top, bottom, albedos = _spread_about(best, _integrals(pair, nodes, of_lobe, COARSE))
+    if not all(np.allclose(part, part[0], rtol=1e-9, atol=0.0) for part in draws):  # an objective has no intervals
+        top *= extrapolation(nodes, measured, len(top))[:, :, None, None] ** _POWERS[:, None]
     result: dict[str, dict] = {key: {} for key in ("whole", "by_region", "share", "by_incidence", "both")}
     wholes = {}
     for k, (name, metric) in enumerate(METRICS.items()):
@@ -118,10 +128,31 @@ def measure_distances(
     )
 
 
+def extrapolation(
+    theta: Float[np.ndarray, " k"], measured: Float[np.ndarray, " a"], count: int
+) -> Float[np.ndarray, "count k"]:
+    """How many times as large a difference may be as two models have it: 1 in the first row and where was measured.
+
+    Args:
+        theta: Incidences, radians.
+        measured: Those that were measured.
+        count: Rows, the best fits and draws.
+    """
+    z = np.random.default_rng(0).standard_normal((count, 2))
+    below, above = np.abs(1.0 + EXTRAPOLATED * np.where(np.arange(count)[:, None] > 0, z, 0.0)).T[:, :, None]
+    least, most = _range(measured)
+    return np.where(theta < least, below, np.where(theta > most, above, 1.0))
+
+
+def _range(measured: np.ndarray) -> tuple[float, float]:
+    """Between which incidences nothing is extrapolated."""
+    return float(measured.min() - WITHIN), float(measured.max() + WITHIN)
+
+
 def _beyond(parts: np.ndarray, theta: np.ndarray, measured: np.ndarray) -> float:
     """Fraction of parts at incidences `theta` that lie outside the range of those measured."""
-    outside = (theta < measured.min() - WITHIN) | (theta > measured.max() + WITHIN)
-    return float(parts[outside].sum() / max(parts.sum(), 1e-300))
+    least, most = _range(measured)
+    return float(parts[(theta < least) | (theta > most)].sum() / max(parts.sum(), 1e-300))
 
 
 def incidence_weight(metric: Metric, theta: np.ndarray, solid: np.ndarray) -> np.ndarray:
@@ -144,6 +175,9 @@ def _at_node(metric: Metric, top: np.ndarray, bottom: np.ndarray, theta: np.ndar
     factor = {"light": np.pi, "mean square": np.pi / 2.0 * np.sin(theta)}.get(metric.kind, 1.0)
     return kept * factor * _over_nodes(metric, top, bottom)
 
+
+_POWERS = np.array([1.0 if metric.kind == "light" else 2.0 for metric in METRICS.values()])
+"""Of the difference that the integrals of each metric hold."""
 
 Integrals = tuple[Float[np.ndarray, "d k m r"], Float[np.ndarray, "d k m r"], Float[np.ndarray, "d k 2"]]
 

@@ -50,9 +50,11 @@ def facets(**values: Any) -> AbstractBRDF:
     return fm.model("lambert+ggx", channels=1, **values)
 
 
-def measured(one: list[AbstractBRDF], other: list[AbstractBRDF]) -> Distances:
+def measured(
+    one: list[AbstractBRDF], other: list[AbstractBRDF], incidences: tuple[float, ...] = (0.0, 45.0, 90.0)
+) -> Distances:
     """Best fit and draws of both."""
-    return measure_distances(one[0], other[0], (rows(*one), rows(*other)), np.deg2rad([20.0, 45.0, 70.0]))
+    return measure_distances(one[0], other[0], (rows(*one), rows(*other)), np.deg2rad(incidences))
 
 
 @pytest.fixture(scope="module")
@@ -106,6 +108,20 @@ def test_draws_give_the_interval(grey: Distances) -> None:
     """Draws of 0.24 and 0.30 beside 0.2: distances 0.2 and 0.5, whose quantiles lie between."""
     assert grey.whole["relative"].ci95 == pytest.approx((0.2 + 0.025 * 0.3, 0.2 + 0.975 * 0.3))
     assert grey.by_incidence["relative"][[0, 2], 4] == pytest.approx([0.2075, 0.4925])
+
+
+def test_what_is_extrapolated_is_known_to_a_factor() -> None:
+    """Beside two Lambert surfaces, of which sin²θ₂ − sin²θ₁ of the squared difference lies between θ₁ and θ₂."""
+    kd = 0.25 + 1e-9 * np.arange(300)  # draws that spread, if hardly
+    found = measured([blinn(kd=k, ks=0.0, exponent=30.0) for k in kd], [facets(kd=0.2, ks=0.0)] * 300, (40.0, 50.0))
+    factors = np.abs(1.0 + 0.5 * np.random.default_rng(9).normal(size=(100_000, 2)))
+    below, above = np.sin(np.deg2rad(37.5)) ** 2, np.cos(np.deg2rad(52.5)) ** 2
+    expected = 0.25 * np.sqrt(1.0 - below - above + factors**2 @ [below, above])
+    assert found.whole["relative"].value == pytest.approx(0.25, rel=1e-6)
+    assert found.whole["relative"].ci95 == pytest.approx(np.quantile(expected, [0.025, 0.975]), rel=0.1)
+    at_10, at_45 = found.by_incidence["relative"][[0, 2]][:, [2, 9]].T
+    assert at_10 == pytest.approx(0.25 * np.quantile(factors, [0.025, 0.975]), abs=0.04)
+    assert at_45 == pytest.approx([0.25, 0.25], rel=1e-5)
 
 
 def test_the_spread_of_draws_needs_fewer_nodes_than_the_best_fits(monkeypatch: pytest.MonkeyPatch) -> None:
