@@ -176,7 +176,7 @@ def _made(chosen: Chosen, target: str, name: str, more: Mapping[str, Any], *, st
     record = _record(chosen, target, name) | dict(made.facts(form))
     record |= {"files": list(contents), "notes": list(notes)}
     record |= {"executed": None if found is None else dataclasses.asdict(found)}
-    contents[RECORD] = json.dumps(plain(record), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    contents[RECORD] = json.dumps(plain(record), indent=1, allow_nan=False) + "\n"
     return Export(target, chosen.model.name, contents, found, notes)
 
 

@@ -116,6 +116,13 @@ def test_a_disk_that_fills_leaves_nothing(tmp_path: Path, monkeypatch: pytest.Mo
     assert os.listdir(tmp_path) == []
 
 
+def test_half_a_letter_in_a_name_is_written(tmp_path: Path) -> None:
+    """A name of a file that is no text: a surrogate, which UTF-8 does not have."""
+    name = "caf\udce9 \ud800"
+    fm.export(LAMBERT, "glsl", tmp_path / "out", name=name)
+    assert json.loads((tmp_path / "out" / "export.json").read_text(encoding="utf-8"))["name"] == name
+
+
 def test_what_is_found_is_said_everywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In the header, in the record and on the screen; also how many are too far."""
     found = Difference(0.01, 1e-5, 80.0, 79.0, 180.0, 12288, 3, "Chrome/1")
