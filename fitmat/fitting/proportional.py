@@ -12,7 +12,7 @@ from fitmat.fitting.concluding import discrepancy_of
 from fitmat.fitting.coordinates import Coordinates
 from fitmat.fitting.ends import Ends, behind
 from fitmat.fitting.likelihood import Data, first_discrepancy, log_pointwise, prepare
-from fitmat.fitting.process import ASKED, FEWEST
+from fitmat.fitting.process import FEWEST
 from fitmat.fitting.refining import optima
 from fitmat.measurements.neighbours import curves
 from fitmat.measurements.noise import Noise
@@ -35,6 +35,9 @@ LEAST = 1e-6
 
 ALIKE = 2.0
 """Standard errors by which neighbouring residuals may be correlated by chance."""
+
+ASKED = 3.0
+"""Nats by which a share of each value must describe the values better than one size of all."""
 
 AGAIN = 4
 """How often a fit is repeated with the noise that its own values make; the share then moves by less than 1 %."""
