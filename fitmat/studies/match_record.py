@@ -6,7 +6,8 @@ It computes nothing.
 from typing import Any
 
 from fitmat.match.ablation import TERMS, Ablation
-from fitmat.match.appearance.spheres import Perceived, Spread
+from fitmat.match.appearance.spheres import Perceived
+from fitmat.match.appearance.spread import Spread
 from fitmat.match.discernibility import Telling
 from fitmat.match.match import Match
 from fitmat.match.regions import GRAZING_DEG
@@ -105,7 +106,7 @@ def _telling_dict(found: Telling) -> list[dict[str, Any]]:
 def _perceived_dict(seen: Perceived) -> dict[str, Any]:
     def difference(found: Spread) -> dict[str, Any]:
         parts = {"mean": found.mean, "worst_twentieth": found.worst_twentieth, "largest": found.largest}
-        return {name: {"value": e.value, "ci95": list(e.ci95)} for name, e in parts.items()}
+        return {name: {"value": e.value, "ci95": list(e.ci95)} for name, e in parts.items()} | {"rule": found.rule}
 
     return {
         "words": seen.words,

@@ -16,14 +16,14 @@ from jaxtyping import Float
 from fitmat.colour.channels import colouring
 from fitmat.colour.differences import CLEARLY_VISIBLE, JUST_NOTICEABLE, delta_e_2000, delta_e_itp
 from fitmat.colour.spaces import shown, to_srgb
-from fitmat.match.appearance import scene
+from fitmat.match.appearance import finer, scene
 from fitmat.match.appearance.scene import Raster, Screen
+from fitmat.match.appearance.spread import Seen, Spread, spread
 from fitmat.match.distances import PairedDraws
 from fitmat.maths.directions import zenith
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.values import Draws, blocks, surfaces, values, widths
 from fitmat.text import brief
-from fitmat.uncertainty.estimate import Estimate, estimate
 
 SPHERE_DRAWS = 20
 """Pairs of posterior draws behind every interval."""
@@ -36,21 +36,6 @@ SEES = ("see no difference", "hardly see a difference", "clearly see a differenc
 
 SIZE = 72
 """Pictures are so many pixels wide."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Spread:
-    """How far apart the colours of two spheres are, over the pixels that are seen and lit.
-
-    Attributes:
-        mean: Mean over the area on the screen.
-        worst_twentieth: What 5 % of the area exceed.
-        largest: Of any pixel.
-    """
-
-    mean: Estimate
-    worst_twentieth: Estimate
-    largest: Estimate
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -161,14 +146,12 @@ def perceived(
     screens, computed = _rendered(pair, colours.weights)
     names = [*scene.LIGHTS, scene.ENVIRONMENT]
     each = zip(names, screens, computed, strict=True)
-    found = [_lighting(name, screen, xyz, pictures) for name, screen, xyz in each]
-    every = [np.concatenate([deltas[k] for _, deltas, _ in found], axis=1) for k in range(2)]
-    shares = np.concatenate([share for _, _, share in found])
+    lightings, seen = zip(*(_lighting(name, screen, xyz, pictures) for name, screen, xyz in each), strict=True)
     return Perceived(
         names=(pair[0][0].name, pair[1][0].name),
-        lightings=tuple(lighting for lighting, _, _ in found),
-        delta_e_2000=_spread(every[0], shares),
-        delta_e_itp=_spread(every[1], shares),
+        lightings=lightings,
+        delta_e_2000=spread([each[0] for each in seen]),
+        delta_e_itp=spread([each[1] for each in seen]),
         colours=colours.words,
     )
 
@@ -208,37 +191,36 @@ def _coloured(f: Float[np.ndarray, "d m c"], weights: Float[np.ndarray, "c 3"]) 
 
 def _lighting(
     name: str, screen: Screen, xyz: Float[np.ndarray, "d 2 m 3"], pictures: bool
-) -> tuple[Lighting, list[np.ndarray], np.ndarray]:
-    """The lighting; ΔE2000 and ΔE_ITP of all draws, (d, m) each; each pixel's share of the lit area, (m,)."""
+) -> tuple[Lighting, tuple[Seen, Seen]]:
+    """The lighting, and ΔE2000 and ΔE_ITP there."""
     share = np.asarray(screen.area / screen.area.sum()).ravel()
     exposure = float(MIDDLE_GREY / max(share @ xyz[0, 1, :, 1], 1e-300))
     one, other = np.moveaxis(exposure * xyz, 1, 0)
-    deltas = [delta_e_2000(shown(one), shown(other)), delta_e_itp(one, other)]
+    both = np.concatenate([one[0], other[0]], axis=1)
+    fine, half = finer.divided(screen, both), finer.divided(*finer.halved(screen, both))
+    each = [_differences(one, other), *(_differences(v[:, :3], v[:, 3:]) for v, _ in (fine, half))]
+    shares = [area / area.sum() for _, area in (fine, half)]
+    seen = Seen(each[0][0], share, (each[1][0], shares[0]), (each[2][0], shares[1]))
+    itp = Seen(each[0][1], share, (each[1][1], shares[0]), (each[2][1], shares[1]))
     lighting = Lighting(
         name=name,
         exposure=exposure,
-        delta_e_2000=_spread(deltas[0], share),
-        delta_e_itp=_spread(deltas[1], share),
+        delta_e_2000=spread([seen]),
+        delta_e_itp=spread([itp]),
         pictures=_both(screen, one[0], other[0]) if pictures else None,
     )
-    return lighting, deltas, share
+    return lighting, (seen, itp)
+
+
+def _differences(one: Float[np.ndarray, "... 3"], other: Float[np.ndarray, "... 3"]) -> tuple[np.ndarray, np.ndarray]:
+    """ΔE2000 of what a display shows, and ΔE_ITP."""
+    return delta_e_2000(shown(one), shown(other)), delta_e_itp(np.maximum(one, 0.0), np.maximum(other, 0.0))
 
 
 def _both(screen: Screen, one: Float[np.ndarray, "m 3"], other: Float[np.ndarray, "m 3"]) -> Pictures:
     drawn = pictured(screen, np.concatenate([one, other], axis=1), scene.raster(SIZE))
     one, other = drawn[..., :3], drawn[..., 3:]
     return Pictures(to_srgb(one), to_srgb(other), delta_e_2000(shown(one), shown(other)))
-
-
-def _spread(delta: Float[np.ndarray, "d m"], share: Float[np.ndarray, " m"]) -> Spread:
-    """Weighted by area; between the ranks of two pixels the quantile is interpolated."""
-    lit = share > 0
-    delta, share = delta[:, lit], share[lit] / share[lit].sum()
-    order = np.argsort(delta, axis=1)
-    below = np.cumsum(share[order], axis=1) - 0.5 * share[order]
-    ranked = np.take_along_axis(delta, order, axis=1)
-    twentieth = np.array([np.interp(0.95, *row) for row in zip(below, ranked, strict=True)])
-    return Spread(estimate(delta @ share), estimate(twentieth), estimate(ranked[:, -1]))
 
 
 def pictured(screen: Screen, values: Float[np.ndarray, "m k"], raster: Raster) -> Float[np.ndarray, "h w k"]:
