@@ -22,7 +22,7 @@ from fitmat.models.lobes.oren_nayar import EnergyPreservingOrenNayar, OrenNayar
 from fitmat.models.lobes.turquin import Turquin
 from fitmat.models.lobes.walter import Walter
 from fitmat.models.parameters import Entry, entries, vector
-from fitmat.models.terms.distributions import Isotropic
+from fitmat.models.terms.distributions import Anisotropic
 from fitmat.models.terms.fresnel import COS_82, F82, Conductor, Dielectric, Schlick, schlick
 from fitmat.text import brief
 
@@ -30,6 +30,12 @@ DIFFUSE = "oren_nayar_diffuse_bsdf"
 
 SAME, FRESNELS = (Lambert, OrenNayar), (Dielectric, Schlick, F82, Conductor)
 """Lobes that a node is, and Fresnel terms that the specular nodes have."""
+
+TURNED = "turned"
+"""Instead of a type: the tangent, turned by so many degrees."""
+
+LINKED = ("BSDF", "surfaceshader", "vector3")
+"""Types of which a text is the name of a node."""
 
 Inputs = dict[str, tuple[str, Any]]
 """Name of an input → its type and value."""
@@ -56,9 +62,9 @@ def translated(chosen: Chosen) -> Document:
     The specular nodes give back the energy of multiple scattering, which no lobe of the library does in their way.
 
     Raises:
-        ModelError: neither 1 nor 3 channels, or a brushed material.
+        ModelError: neither 1 nor 3 channels, or a brushed material that has no nodes.
     """
-    _checked(chosen)
+    coloured(chosen, "MaterialX")
     lobes = chosen.model.lobes if isinstance(chosen.model, Sum) else (chosen.model,)
     own = tuple(_own(lobe) for lobe in lobes)
     categories = [_node(lobe)[0] for lobe in own if lobe is not None]
@@ -69,7 +75,8 @@ def translated(chosen: Chosen) -> Document:
     into = own[0] if len(own) == 1 else Sum(tuple(lobe for lobe in own if lobe is not None))
     assert into is not None
     bare = [e.name for e in entries(into) if e.name.endswith("ks") and np.all(_value(into, e) == 1.0)]
-    found = closest(chosen, into, [dict.fromkeys(bare, 1.0)])
+    turned = {e.name: _value(into, e) for e in entries(into) if e.name.endswith("rotation")}
+    found = closest(chosen, into, [dict.fromkeys(bare, 1.0) | turned])
     lobes = found.model.lobes if isinstance(found.model, Sum) else (found.model,)
     return Document(tuple(map(_node, lobes)), found)
 
@@ -82,7 +89,7 @@ def open_surface(chosen: Chosen) -> Document:
     """The closest OpenPBR surface.
 
     Raises:
-        ModelError: as `translated`.
+        ModelError: neither 1 nor 3 channels, or a brushed material.
     """
     found = closest(chosen, *template(_checked(chosen)))
     v = found.values
@@ -97,8 +104,8 @@ def _checked(chosen: Chosen) -> int:
     count = coloured(chosen, "MaterialX")
     if not chosen.model.isotropic:
         raise ModelError(
-            f"{chosen.model.name} is brushed, expected an isotropic material: MaterialX masks brushed ones by the mean "
-            "of both slopes. Export it with --to gltf or --to glsl."
+            f"{chosen.model.name} is brushed, expected an isotropic material: OpenPBR's anisotropy is not written. "
+            "Export it with --to gltf, or ggx-aniso with --to materialx."
         )
     return count
 
@@ -110,7 +117,6 @@ def _own(lobe: AbstractBRDF) -> AbstractBRDF | None:
     if isinstance(lobe, EnergyPreservingOrenNayar):
         return RoughDiffuse(lobe.kd, lobe.r)
     if isinstance(lobe, Microfacet | KullaConty | Turquin | Walter) and isinstance(lobe.fresnel, FRESNELS):
-        assert isinstance(lobe.roughness, Isotropic)
         return Compensated(lobe.ks, lobe.roughness, lobe.fresnel)
     return None
 
@@ -125,8 +131,10 @@ def _node(lobe: AbstractBRDF) -> tuple[str, Inputs]:
         preserving: Inputs = {"energy_compensation": ("boolean", "true")}
         return DIFFUSE, {"color": ("color3", lobe.kd), "roughness": ("float", lobe.r)} | preserving
     assert isinstance(lobe, Compensated)
-    fresnel, alpha = lobe.fresnel, float(lobe.roughness.alpha)
-    slopes: Inputs = {"roughness": ("vector2", [alpha, alpha])}
+    fresnel, rough = lobe.fresnel, lobe.roughness
+    slopes: Inputs = {"roughness": ("vector2", [float(slope) for slope in rough.slopes])}
+    if isinstance(rough, Anisotropic) and float(rough.rotation) != 0.0:
+        slopes["tangent"] = TURNED, float(rough.rotation)
     if isinstance(fresnel, Dielectric):
         return "dielectric_bsdf", {"tint": ("color3", lobe.ks), "ior": ("float", fresnel.eta), **slopes}
     weight: Inputs = {"weight": ("float", lobe.ks)}
@@ -159,8 +167,10 @@ def texts(name: str, header: Sequence[str], document: Document) -> dict[str, str
 def xml(document: Document) -> str:
     """The document's element."""
     parts, names = "", []
-    for k, (category, inputs) in enumerate(document.nodes):
+    for k, (category, given) in enumerate(document.nodes):
         names.append(f"lobe{k + 1}")
+        turned, inputs = _turned(f"tangent{k + 1}", given)
+        parts += turned
         parts += _element(category, names[-1] if category != "open_pbr_surface" else "surface", inputs)
     for k in range(1, len(names)):
         top = names[0] if k == 1 else f"sum{k - 1}"
@@ -172,7 +182,19 @@ def xml(document: Document) -> str:
     return f'<materialx version="1.39" colorspace="lin_rec709">\n{parts}</materialx>\n'
 
 
+def _turned(name: str, inputs: Inputs) -> tuple[str, Inputs]:
+    """The nodes that turn the tangent of a lobe about the normal, and its inputs with it; rotate3d turns clockwise."""
+    if inputs.get("tangent", ("",))[0] != TURNED:
+        return "", inputs
+    world: Inputs = {"space": ("string", "world")}
+    ends: Inputs = {"in": ("vector3", f"{name}_along"), "amount": ("float", -inputs["tangent"][1])}
+    ends["axis"] = "vector3", f"{name}_normal"
+    parts = _element("tangent", f"{name}_along", world) + _element("normal", f"{name}_normal", world)
+    return parts + _element("rotate3d", name, ends), inputs | {"tangent": ("vector3", name)}
+
+
 KINDS = {"surfacematerial": "material", "surface": "surfaceshader", "open_pbr_surface": "surfaceshader"}
+KINDS |= dict.fromkeys(("tangent", "normal", "rotate3d"), "vector3")
 """Category → its type, where it is no BSDF."""
 
 
@@ -184,7 +206,7 @@ def _element(category: str, name: str, inputs: Inputs) -> str:
 
 def _input(name: str, kind: str, value: Any) -> str:
     if isinstance(value, str):
-        said = f"nodename={quoteattr(value)}" if kind in ("BSDF", "surfaceshader") else f"value={quoteattr(value)}"
+        said = f"nodename={quoteattr(value)}" if kind in LINKED else f"value={quoteattr(value)}"
     else:
         count = {"color3": 3, "vector2": 2}.get(kind, 1)
         numbers = np.broadcast_to(np.ravel(np.asarray(value, float)), (count,))

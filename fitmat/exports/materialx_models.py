@@ -1,7 +1,7 @@
 """What MaterialX 1.39.5 does, as models of the library: its rough diffuse node, its specular nodes, and OpenPBR 1.1.1.
 
 Its renderers' own approximations are part of it: the fitted albedo, and what it clamps. Of OpenPBR the opaque base and
-the specular lobe are here; coat, fuzz, subsurface, transmission, thin film and brushed materials are not.
+the specular lobe are here; coat, fuzz, subsurface, transmission, thin film and its anisotropy are not.
 """
 
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ from fitmat.maths.directions import COS_MIN, above, pair
 from fitmat.models.base import AbstractDiffuse, AbstractLobe, AbstractSpecular, specular_weight
 from fitmat.models.lobes.oren_nayar import C1_FON, EnergyPreservingOrenNayar
 from fitmat.models.parameters import param
-from fitmat.models.terms.distributions import GGX, Isotropic, visibility
+from fitmat.models.terms.distributions import GGX, AbstractRoughness, Isotropic, visibility
 from fitmat.models.terms.fresnel import COS_82, AbstractFresnel, Dielectric, dielectric, f0_from_eta, schlick
 
 # mx_microfacet_specular.glsl, mx_ggx_dir_albedo_analytic: factors of 1, x, y, xy, x², y², x²y, xy², x²y².
@@ -79,31 +79,33 @@ class Compensated(AbstractSpecular):
 
     f = ks F D G/(4 c_i c_o) (1 + F (1 − E(c_o))/E(c_o))
 
-    As `ggx-turquin`, with F at the micro-normal instead of F0, and the fitted albedo for E.
+    As `ggx-turquin`, with F at the micro-normal instead of F0, and the fitted albedo for E. Of brushed surfaces G and
+    E are those of one slope, √(α_x α_y).
 
-    Parameters: as `ggx`.
+    Parameters: as `ggx`, or as `ggx-aniso`.
 
     Reference: MaterialX 1.39.5, libraries/pbrlib/genglsl.
     """
 
-    label: ClassVar[str] = "materialx-ggx{fresnel.suffix}"
+    label: ClassVar[str] = "materialx-ggx{roughness.suffix}{fresnel.suffix}"
     breaks: ClassVar[Mapping[str, str]] = MappingProxyType({"reciprocal": "its factor is that of the eye alone"})
 
     ks: Spectrum = specular_weight()
-    roughness: Isotropic = eqx.field(default_factory=Isotropic)
+    roughness: AbstractRoughness = eqx.field(default_factory=Isotropic)
     fresnel: AbstractFresnel = eqx.field(default_factory=Dielectric)
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """Single scattering times 1 + F (1 − E)/E."""
-        p, slopes = pair(wi, wo), self.roughness.slopes
-        mirror = GGX().density(p.h, slopes) * visibility(GGX(), "correlated", slopes, p) / 4.0
+        p, slopes = self.roughness.pair(wi, wo), self.roughness.slopes
+        mean = jnp.sqrt(slopes[0] * slopes[1])
+        mirror = GGX().density(p.h, slopes) * visibility(GGX(), "correlated", (mean, mean), p) / 4.0
         fresnel = self.fresnel(p.cos_d)
-        kept = 1.0 + fresnel * lost(wo[2], self.roughness.alpha)
+        kept = 1.0 + fresnel * lost(wo[2], mean)
         return jnp.where(above(wi, wo), self.ks * fresnel * mirror * kept, 0.0)
 
     def width(self) -> Scalar:
-        """α."""
-        return self.roughness.alpha
+        """The smaller slope."""
+        return self.roughness.width()
 
 
 class OpenPBR(AbstractLobe):

@@ -16,8 +16,8 @@ from fitmat.exports.material import Chosen
 from fitmat.exports.materialx_models import Compensated, OpenPBR, RoughDiffuse
 from fitmat.maths.directions import from_angles
 from fitmat.models.base import AbstractBRDF, evaluate
-from fitmat.models.terms.distributions import Isotropic
-from fitmat.models.terms.fresnel import F82
+from fitmat.models.terms.distributions import Anisotropic, Isotropic
+from fitmat.models.terms.fresnel import F82, Conductor
 
 AGREE = 1e-3
 """Relative; single precision and numbers of six decimals in MaterialX's shader, up to 89.9 degrees."""
@@ -65,8 +65,11 @@ def chromium_and_materialx() -> str:
 
 
 def node(**values: Any) -> Compensated:
-    rough: Any = {"alpha": values.pop("alpha")}
-    return Compensated(roughness=Isotropic(**rough), **values)
+    if "alpha" in values:
+        rough: Any = {"alpha": values.pop("alpha")}
+        return Compensated(roughness=Isotropic(**rough), **values)
+    rough = {key: values.pop(key) for key in ("alpha_x", "alpha_y", "rotation")}
+    return Compensated(roughness=Anisotropic(**rough), **values)
 
 
 F82_TERM: dict[str, Any] = {"f0": K + 0.5, "f82": K + 0.6}
@@ -78,8 +81,9 @@ RUN: dict[str, AbstractBRDF] = {
     "eon": RoughDiffuse(**ROUGH),
     "f82": node(alpha=0.3, fresnel=F82(**F82_TERM)),
     "dielectric": node(alpha=0.1),
+    "brushed": node(alpha_x=0.1, alpha_y=0.3, rotation=30.0, fresnel=Conductor(**GOLD)),
 }
-CHANGED = ("open-pbr", "eon")
+CHANGED = ("open-pbr", "eon", "brushed")
 """Of which a changed number is tried as well."""
 
 
@@ -152,5 +156,5 @@ def test_lobes_become_nodes_or_the_closest_open_pbr() -> None:
 def test_what_materialx_cannot_hold_is_refused() -> None:
     with pytest.raises(ModelError, match="there are 4 channels, expected 1 or 3: the colours of MaterialX are three"):
         fm.export(fm.model("lambert", channels=4), "materialx")
-    with pytest.raises(ModelError, match="ggx-aniso is brushed, expected an isotropic material"):
+    with pytest.raises(ModelError, match="ggx-aniso is brushed, expected an isotropic material: OpenPBR"):
         fm.export(fm.model("ggx-aniso"), "openpbr")
