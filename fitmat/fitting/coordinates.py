@@ -150,6 +150,14 @@ class Coordinates:
         """Unbounded coordinates (k,) to a parameter vector (p,), always within the bounds."""
         return self.filled(base, jnp.asarray(self.low) + self.span * (1.0 + jnp.sin(u)) / 2.0)
 
+    def bend(self, u: Array, slope: Float[Array, " k"]) -> Float[Array, " k"]:
+        """What the sine adds to the second derivative of a cost of which ∂/∂u is given, where that is more than 0.
+
+        x″ ∂cost/∂x = −tan u ∂cost/∂u. Where the cost falls towards a bound it is all the curvature there is: the slope
+        of the residuals vanishes there, and steps by JᵀJ alone would be as long as they are senseless.
+        """
+        return jnp.maximum(-jnp.tan(u) * slope, 0.0)
+
     def folded(self, natural: Float[np.ndarray, "... k"]) -> Float[np.ndarray, "... k"]:
         """Natural coordinates mirrored at the bounds until they lie between them."""
         turn = (natural - self.low) % (2.0 * self.span)

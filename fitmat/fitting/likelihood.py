@@ -90,8 +90,10 @@ class Data(eqx.Module):
         return dataclasses.replace(self, prior=None, loss=loss, level=None)
 
 
-def prepare(m: Measurements, noise: Noise, prior: Prior | None = None, loss: Loss = DEFAULT) -> Data:
-    """Measurements and their noise, ready for the likelihood.
+def prepare(
+    m: Measurements, noise: Noise, prior: Prior | None = None, loss: Loss = DEFAULT, *, scaled: bool = True
+) -> Data:
+    """Measurements and their noise, ready for the likelihood; `typical` is NaN where it is not asked for (`scaled`).
 
     Rows with nothing valid are left out, and values at θ_o = 90° under all but an objective; what the loss cannot be
     applied to has weight 0; rows of weight 0 fill up to `padded_length`, so that files of similar size share programs.
@@ -106,7 +108,8 @@ def prepare(m: Measurements, noise: Noise, prior: Prior | None = None, loss: Los
     padded = (_padded(part, extra, fill) for part, fill in zip(parts, _FILL, strict=True))
     level = _padded(levels(m), extra, 1.0) if loss.infers_noise else None
     wi, wo, x, deviation, kappa, weight = padded
-    return Data(wi, wo, x, deviation, kappa, weight, prior, loss, level, noise_scale(x, deviation, weight))
+    typical = noise_scale(x, deviation, weight) if scaled else np.array(np.nan)
+    return Data(wi, wo, x, deviation, kappa, weight, prior, loss, level, typical)
 
 
 _FILL = ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0), 0.0, 1.0, 1.0, 0.0)

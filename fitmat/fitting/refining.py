@@ -175,7 +175,7 @@ def refine(
             s = state.discrepancy
             left = jnp.minimum(BURST, max_steps - state.steps)
             args = (s, transformed(data, s))
-            end = least_squares(residual, state.u, args, max_steps=left, damping=state.damping)
+            end = least_squares(residual, state.u, args, max_steps=left, damping=state.damping, bend=moved.bend)
             updated = best_discrepancy(end.beside, data, s)
             settled = jnp.abs(updated - s) <= SETTLED * s
             ended, steady = settled & end.solved, settled & (end.offset < STEADY)

@@ -13,15 +13,15 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from fitmat.fitting.coordinates import coordinates
-from fitmat.fitting.likelihood import Data, log_likelihood, prepare, residuals
-from fitmat.maths.least_squares import normal_equations
-from fitmat.maths.programs import program
+from fitmat.fitting.likelihood import Data, log_likelihood, predicted, prepare, residuals
+from fitmat.maths.least_squares import jacobian
+from fitmat.maths.programs import program, program_run_often
 from fitmat.measurements.noise import Noise
 from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector
 
-BLOCK = 2**15
+BLOCK = 2**14
 """Rows for which the program that adds up one block is compiled; its intermediate arrays stay in the cache."""
 
 
@@ -50,23 +50,25 @@ def block_sums(best: AbstractBRDF, data: Data, s: float) -> Sums:
     return Sums(*(np.asarray(part) for part in _block_sums(best, data, np.asarray(s))))
 
 
-@program
+@program_run_often
 def _block_sums(best: AbstractBRDF, data: Data, s: ArrayLike) -> tuple[Array, ...]:
-    s = jnp.asarray(s)
-    every, values = coordinates(best), vector(best)
-    at = every.natural(values)
+    s, one, every, values = jnp.asarray(s), jnp.ones(()), coordinates(best), vector(best)
+    x, columns = jacobian(lambda t: predicted(every.model(best, values, t), data), every.natural(values))
 
-    def by_parameter(s: Array) -> tuple[Array, Array]:
-        found = normal_equations(lambda t: residuals(every.model(best, values, t), data, s), at)
-        return found.slope, found.gram
+    def by_value(s: Array) -> tuple[Array, Array]:
+        return jax.jvp(lambda x: residuals(best, data, s, x), (x,), (jnp.ones_like(x),))
 
-    def slope(s: Array) -> tuple[Array, Array]:
-        cost, change = jax.value_and_grad(lambda s: -log_likelihood(best, data, s))(s)
-        return change, cost
+    def cost(s: Array) -> Array:
+        return -log_likelihood(best, data, s, x)
 
-    (gradient, gram), (mixed, _) = jax.jvp(by_parameter, (s,), (jnp.ones_like(s),))
-    (change, cost), (curvature, _) = jax.jvp(slope, (s,), (jnp.ones_like(s),))
-    return cost, gradient, gram, change, mixed, curvature
+    (r, by_x), (r_change, by_x_change) = jax.jvp(by_value, (s,), (one,))
+    (total, change), (_, curvature) = jax.jvp(lambda s: jax.jvp(cost, (s,), (one,)), (s,), (one,))
+    # Made before they are added up: a product that is fused into a dot product is computed number by number.
+    weighted, bent, columns, r, r_change = jax.lax.optimization_barrier(
+        (columns * by_x.ravel(), (by_x_change * r).ravel(), columns, r.ravel(), r_change.ravel())
+    )
+    mixed = weighted @ r_change + columns @ bent
+    return total, weighted @ r, weighted @ weighted.T, change, mixed, curvature
 
 
 def block_curvature(best: AbstractBRDF, data: Data, s: float) -> Float[np.ndarray, "p p"]:
@@ -100,7 +102,7 @@ def blocks(chunk: Measurements, noise: Noise) -> Iterator[Data]:
     """A chunk as the likelihood sees it, in blocks of `BLOCK` rows, the last one filled with rows of weight 0."""
     for first in range(0, chunk.n_samples, BLOCK):
         rows = np.arange(first, min(first + BLOCK, chunk.n_samples))
-        data = prepare(chunk.rows(rows), dataclasses.replace(noise, sigma=noise.sigma[rows]))
+        data = prepare(chunk.rows(rows), dataclasses.replace(noise, sigma=noise.sigma[rows]), scaled=False)
         extra = ((0, BLOCK - len(data.x)), (0, 0))
         parts = (data.wi, data.wo, data.x, data.noise, data.kappa)
         yield Data(*(np.pad(part, extra, mode="edge") for part in parts), weight=np.pad(data.weight, extra))

@@ -58,13 +58,25 @@ def normal_equations(residual: Callable[[Float[Array, " p"]], Array], x: Float[A
     return _seen(lambda at: (residual(at), None), x)[0]
 
 
+def jacobian(of: Callable[[Float[Array, " p"]], Array], x: Float[Array, " p"]) -> tuple[Array, Float[Array, "p n"]]:
+    """A function's value at x, of any shape, and the slope of its n numbers along each parameter."""
+    value, columns, _ = _along(lambda at: (of(at), None), x)
+    return value, columns
+
+
+def _along(of: Callable[[Float[Array, " p"]], tuple[Array, Any]], x: Float[Array, " p"]) -> tuple[Array, Array, Any]:
+    """`jacobian`, and what the values come with."""
+    value, along, beside = jax.linearize(of, x, has_aux=True)
+    ways = jnp.eye(len(x))
+    columns = jnp.stack([along(e) for e in ways]) if 0 < len(x) <= FEW else jax.vmap(along)(ways)
+    return value, columns.reshape(len(x), value.size), beside
+
+
 def _seen(
     residual: Callable[[Float[Array, " p"]], tuple[Array, Any]], x: Float[Array, " p"]
 ) -> tuple[Normal, Any, float]:
     """The normal equations at x, what the residuals come with, and how many they are."""
-    r, along, beside = jax.linearize(lambda at: _flat(residual(at)), x, has_aux=True)
-    ways = jnp.eye(len(x))
-    columns = jnp.stack([along(e) for e in ways]) if 0 < len(x) <= FEW else jax.vmap(along)(ways)
+    r, columns, beside = _along(lambda at: _flat(residual(at)), x)
     return Normal(r @ r, columns @ r, columns @ columns.T), beside, float(r.size)
 
 
@@ -80,6 +92,7 @@ def least_squares(
     tolerance: float = RTOL,
     max_steps: Any = 256,
     damping: Any = 1.0,
+    bend: Callable[[Array, Array], Array] | None = None,
 ) -> Minimum:
     """Minimise ½Σ residual² from x0.
 
@@ -90,6 +103,7 @@ def least_squares(
         tolerance: Both the relative and the absolute tolerance in the scaled units.
         max_steps: Looks at all residuals before giving up.
         damping: The first λ, as a fraction of the usual one; smaller where the start is known to be close.
+        bend: What the curvature of x's own chart adds to the diagonal of JᵀJ, at least 0, of x and Jᵀr.
 
     Returns:
         The last iterate and how the solve ended; never raises for numerical reasons.
@@ -98,8 +112,10 @@ def least_squares(
 
     @jax.jit  # its shapes and its values by one trace
     def point(x: Array, args: Any) -> tuple[Array, tuple[Normal, Any, float]]:
-        seen = _seen(lambda at: residual(at, args), x)
-        return jnp.sqrt(seen[0].square), seen
+        here, beside, count = _seen(lambda at: residual(at, args), x)
+        if bend is not None:
+            here = here._replace(gram=here.gram + jnp.diag(bend(x, here.slope)))
+        return jnp.sqrt(here.square), (here, beside, count)
 
     solver = LevenbergMarquardt(rtol=tolerance, atol=tolerance, limit=max_steps, damping=damping)
     unused: tuple[Any, frozenset[object]] = ({}, frozenset())

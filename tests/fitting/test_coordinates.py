@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import lsq_linear
 
 import fitmat as fm
 from fitmat.fitting.coordinates import AT_BOUND, EDGE, Coordinates, coordinates
+from fitmat.maths.least_squares import least_squares
 from fitmat.models.parameters import param, vector
 
 ROUNDING = 1e-12
@@ -110,3 +112,22 @@ def test_sides_tell_lower_from_upper() -> None:
     near, far = 2 * 0.5 * AT_BOUND, 2 * 2 * AT_BOUND
     assert TOY.side(np.array([near, 1.0])).tolist() == [-1, 0]
     assert TOY.side(np.array([far, 1.0])).tolist() == [0, 0]
+
+
+@pytest.mark.parametrize("first", [0.1, 0.5, 0.9])
+def test_a_solver_slides_along_a_bound(first: float) -> None:
+    """To SciPy's bounded minimum of linear residuals, from a start on the bound beyond which the free minimum lies."""
+    columns = np.random.default_rng(4).normal(size=(200, 2)) @ np.array([[1.0, 0.9], [0.0, 0.3]])
+    target = columns @ np.array([0.2, 3.0]) + np.random.default_rng(5).normal(size=200)
+    box = Coordinates((0, 1), (0.0, 0.0), (4.0, 1.0), (False, False))
+    begin = box.unbounded(np.array([4.0 * first, 1.0]))
+
+    def residual(u: jax.Array, _: None) -> tuple[jax.Array, None]:
+        return jnp.asarray(columns) @ box.from_unbounded(BASE, u) - target, None
+
+    end = least_squares(residual, jnp.asarray(begin), bend=box.bend)
+    expected = lsq_linear(columns, target, ([0, 0], [4, 1]), method="bvls")
+    assert end.solved
+    assert int(end.steps) < 20
+    np.testing.assert_allclose(box.from_unbounded(BASE, end.x), expected.x, rtol=1e-6)  # 1e-8 of steps, with room
+    assert expected.active_mask.tolist() == [0, 1]
