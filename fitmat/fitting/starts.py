@@ -49,11 +49,11 @@ def starting_points(
     """
     free = [e for e in entries(model) if e.name not in held]
     nodes = _nodes(model, [e for e in free if not e.param.weight], held)
-    places = np.array([k for e in free if e.param.weight for k in range(e.place.start, e.place.stop)], int)
+    weights = [e for e in free if e.param.weight]
     thinned = data.every(-(-data.x.shape[0] // MAX_ROWS))
-    per_node = (2 + len(places)) * thinned.x.size
+    per_node = (2 + len(weights)) * thinned.x.size
     found = [
-        _solve_nodes(model, thinned, s, nodes[part], places)
+        _solve_nodes(model, thinned, s, nodes[part], weights)
         for part in slices(len(nodes), max(1, MOST_NUMBERS // per_node))
     ]
     solved, cost = (np.concatenate(part) for part in zip(*found, strict=True))
@@ -82,26 +82,52 @@ def _spread_over(axes: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
 
 
 def _solve_nodes(
-    model: AbstractBRDF, data: Data, s: np.ndarray, nodes: Float[np.ndarray, "k p"], places: np.ndarray
+    model: AbstractBRDF, data: Data, s: np.ndarray, nodes: Float[np.ndarray, "k p"], weights: Sequence[Entry]
 ) -> tuple[Float[np.ndarray, "k p"], Float[np.ndarray, " k"]]:
-    """For every node: the vector with its weights solved, and its cost in the transform of the likelihood."""
+    """For every node: the vector with its weights solved, and its cost in the transform of the likelihood.
+
+    A weight with one number a channel counts in that channel only: one look at the model serves all its numbers.
+    """
     dark = nodes.copy()
-    dark[:, places] = 0.0
-    lit = np.repeat(dark[:, None], 1 + len(places), axis=1)
-    lit[:, np.arange(1, 1 + len(places)), places] = 1.0
+    for entry in weights:
+        dark[:, entry.place] = 0.0
+    lit = np.repeat(dark[:, None], 1 + len(weights), axis=1)
+    for k, entry in enumerate(weights):
+        lit[:, 1 + k, entry.place] = 1.0
     x = values(model, lit.reshape(-1, dark.shape[1]), data.wi, data.wo) * data.kappa
     x = x.reshape(*lit.shape[:2], *data.x.shape)
     offset, columns, predicted = x[:, 0], x[:, 1:] - x[:, :1], x[:, 0]
     with np.errstate(all="ignore"):  # a node at which the model is not finite comes last
-        if len(places):
+        if weights:
             root = np.sqrt(data.weight) / spread(data.x, data.noise, s)
-            weighted = (columns * root).reshape(len(nodes), len(places), -1)
-            target = ((data.x - offset) * root).reshape(len(nodes), -1)
-            gram, moment = weighted @ weighted.transpose(0, 2, 1), np.einsum("kwn,kn->kw", weighted, target)
-            dark[:, places] = nonnegative(gram, moment)
-            predicted = offset + np.einsum("kw,kwnc->knc", dark[:, places], columns)
+            weighted, target = np.moveaxis(columns * root, -1, 1), np.moveaxis((data.x - offset) * root, -1, 1)
+            gram, moment = weighted @ weighted.swapaxes(-1, -2), (weighted @ target[..., None])[..., 0]
+            found = _weights(gram, moment, [entry.size for entry in weights])
+            for k, entry in enumerate(weights):
+                dark[:, entry.place] = found[:, : entry.size, k]
+            predicted = offset + np.einsum("kcw,kwnc->knc", found, columns)
         z = stabilised(data.x, data.noise, s) - stabilised(predicted, data.noise, s)
         return dark, np.sum(data.weight * z**2, axis=(1, 2))
+
+
+def _weights(
+    gram: Float[np.ndarray, "k c w w"], moment: Float[np.ndarray, "k c w"], sizes: Sequence[int]
+) -> Float[np.ndarray, "k c w"]:
+    """The weights of each channel: each channel by itself, or all at once where one weight is of several channels.
+
+    Args:
+        gram: Of each channel's columns.
+        moment: Of each channel's columns with what is measured.
+        sizes: How many numbers each weight has: as many as channels, or 1.
+    """
+    channels = gram.shape[1]
+    if all(size == channels for size in sizes):
+        return nonnegative(gram, moment)
+    begin = np.cumsum([0, *sizes])
+    places = np.array([begin[k] + np.arange(channels) * (size > 1) for k, size in enumerate(sizes)]).T
+    of_channel = np.eye(int(begin[-1]))[places]
+    every = np.einsum("cip,kcij,cjq->kpq", of_channel, gram, of_channel)
+    return nonnegative(every, np.einsum("cip,kci->kp", of_channel, moment))[:, places]
 
 
 def nonnegative(gram: Float[np.ndarray, "... k k"], moment: Float[np.ndarray, "... k"]) -> Float[np.ndarray, "... k"]:

@@ -13,7 +13,7 @@ from scipy.optimize import nnls
 import fitmat as fm
 from fitmat.fitting import starts
 from fitmat.fitting.likelihood import Data, prepare
-from fitmat.fitting.starts import nonnegative, starting_points
+from fitmat.fitting.starts import _weights, nonnegative, starting_points
 from fitmat.measurements.noise import measured_noise
 from fitmat.models.parameters import entries
 
@@ -108,3 +108,21 @@ def test_fixed_parameters_stay_and_small_grids_give_fewer_starts(data: Data) -> 
 def test_a_model_with_everything_fixed_has_one_start(data: Data) -> None:
     points = starting_points(fm.model("lambert"), data, np.array(1e-3), {"kd": np.array([0.4])}, 6)
     np.testing.assert_array_equal(points, [[0.4]])
+
+
+@pytest.mark.parametrize("sizes", [(4, 4), (4, 1), (1, 1), (1, 4, 4)])
+def test_weights_of_several_channels_are_those_of_scipy(sizes: tuple[int, ...]) -> None:
+    """Lawson & Hanson on the whole system, in which each number of a weight has its own column."""
+    rng = np.random.default_rng(7)
+    columns, target = rng.uniform(0.0, 1.0, (30, 4, len(sizes))), rng.uniform(-0.5, 2.0, (30, 4))
+    whole = []
+    for k, size in enumerate(sizes):
+        own = np.zeros((30, 4, size))
+        for channel in range(4):
+            own[:, channel, channel if size > 1 else 0] = columns[:, channel, k]
+        whole.append(own.reshape(120, size))
+    expected = np.split(nnls(np.concatenate(whole, axis=1), target.ravel())[0], np.cumsum(sizes)[:-1])
+    gram, moment = np.einsum("nci,ncj->cij", columns, columns), np.einsum("nci,nc->ci", columns, target)
+    found = _weights(gram[None], moment[None], sizes)[0]
+    for k, numbers in enumerate(expected):
+        np.testing.assert_allclose(found[:, k], np.broadcast_to(numbers, 4), atol=1e-7)
