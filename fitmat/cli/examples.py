@@ -71,7 +71,7 @@ EXPORT = (
     "  gltf: NAME.gltf, usd: NAME.usda, pbrt: NAME.pbrt, radiance: NAME.rad, the closest material that it can hold\n\n"
     "  blender: NAME.py, which makes the closest Principled BSDF; unreal, unity: NAME.json, values to type in\n\n"
     "  osl: NAME.osl, a shader of closures\n\n"
-    "  zemax: NAME.bsdf, or one for each channel\n\n"
+    "  zemax: NAME.bsdf; klems: NAME.xml, or one for each channel\n\n"
     "  table: NAME.csv, NAME.parquet, NAME.json\n\n"
     "  merl: NAME.binary\n\n"
     "Examples:\n\n"

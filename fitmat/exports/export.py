@@ -91,14 +91,14 @@ def export(
     closest OpenPBR surface. The closest material that they hold: glTF, `NAME.gltf`; OpenUSD, `NAME.usda`; pbrt,
     `NAME.pbrt`; Radiance, `NAME.rad`; Blender, `NAME.py`, which makes it; Unreal and Unity,
     `NAME.json`, the values to type in. OSL: `NAME.osl`. A table: `NAME.csv`, `NAME.parquet` and `NAME.json`, the values
-    at a goniometer's angles. MERL: `NAME.binary`; Zemax: `NAME.bsdf`. `export.json` holds the values and the
-    difference.
+    at a goniometer's angles. MERL: `NAME.binary`; Zemax: `NAME.bsdf`; a Klems matrix: `NAME.xml`. `export.json`
+    holds the values and the difference.
     What the instrument and a tilted mount did is not part of the material.
 
     Args:
         material: A model, a fit, a study, or the result of one from `fitmat.load`.
         target: "glsl", "glsl-330", "mitsuba", "materialx", "openpbr", "gltf", "usd", "pbrt", "radiance",
-            "blender", "unreal", "unity", "osl", "zemax", "table" or "merl".
+            "klems", "blender", "unreal", "unity", "osl", "zemax", "table" or "merl".
         folder: Where to; it appears complete or not at all. None to write nothing.
         model: Which model of a study; None for the one that the data prefer.
         name: Of the material, and of the files; None for that of the measurements, or of the model.

@@ -9,7 +9,7 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -38,7 +38,7 @@ LEAST = 1e-6
 
 PLANE = "(ux uy uz) of plastic2 and metal2 is azimuth 0 on a surface that faces +z; elsewhere put its tangent there."
 
-OPTIONS = "-h -ab 0 -aa 0 -av 0 0 0 -dj 0 -ds 0 -dt 0 -dc 1 -st 1 -lr 0 -lw 0 -fad"
+OPTIONS = "-h -ab 0 -aa 0 -av 0 0 0 -dj 0 -ds 0 -dt 0 -dc 1 -st 1 -ss 0 -lr 0 -lw 0 -fad"
 """Of rtrace: nothing but the sun, no sampling."""
 
 
@@ -132,14 +132,24 @@ def difference(chosen: Chosen, found: Closest) -> Difference | None:
     if program() is None:
         return None
     wi, wo = directions()
-    values, executor = run(found.model, *exact(wi, wo))
+    values, executor = run(lambda name, frame: primitive(found, name, frame), *exact(wi, wo))
     return compared(values, evaluate(chosen.model, *exact(wi, wo)), wi, wo, executor, least=LEAST)
 
 
 def run(
-    model: AbstractBRDF, wi: Float[np.ndarray, "n 3"], wo: Float[np.ndarray, "n 3"]
+    words: Callable[[str, Float[np.ndarray, "3 3"]], str],
+    wi: Float[np.ndarray, "n 3"],
+    wo: Float[np.ndarray, "n 3"],
+    *,
+    beside: Mapping[str, str] | None = None,
 ) -> tuple[Float[np.ndarray, "n 3"], str]:
     """rtrace's values at pairs of directions: facets far apart, each turned so that one sun at +z is in its wi.
+
+    Args:
+        words: Identifier, and the axes of a facet in the world as rows → its material in Radiance's words.
+        wi: Directions to the light.
+        wo: Directions to the eye.
+        beside: File names → texts, where the material looks for them.
 
     Raises:
         OutputError: a program does not end well.
@@ -148,23 +158,21 @@ def run(
     assert found is not None
     frame = _frames(wi)
     place = np.random.default_rng(0).uniform(0.0, WIDE, wi.shape)
-    up, eye = frame[:, :, 2], np.einsum("nij,nj->ni", frame, wo)
+    eye = np.einsum("nij,nj->ni", frame, wo)
     omega = 4.0 * math.pi * math.sin(math.radians(SUN) / 4.0) ** 2
     scene = f"void light sun\n0\n0\n3{f' {1.0 / omega!r}' * 3}\nsun source sky\n0\n0\n4 0 0 1 {SUN}\n"
-    brushed = not model.isotropic
-    scene += "" if brushed else primitive(model)
-    for k in range(len(wi)):
-        name = f"material{k}" if brushed else "material"
-        scene += primitive(model, name, frame[k].T) if brushed else ""
-        scene += f"{name} ring facet{k}\n0\n0\n8 {_said(place[k])} {_said(up[k])} 0 {RADIUS}\n"
+    for k, axes in enumerate(np.swapaxes(frame, 1, 2)):
+        facet = f"facet{k}\n0\n0\n8 {_said(place[k])} {_said(axes[2])} 0 {RADIUS}\n"
+        scene += f"{words(f'material{k}', axes)}material{k} ring {facet}"
+    rays = "".join(f"{_said(p + HIGH * w)} {_said(-w)}\n" for p, w in zip(place, eye, strict=True))
     folder, more = found
     with tempfile.TemporaryDirectory(prefix="fitmat-radiance-") as name:
-        (Path(name) / "scene.rad").write_text(scene, encoding="utf-8")
+        for file, text in ({"scene.rad": scene} | dict(beside or {})).items():
+            (Path(name) / file).write_text(text, encoding="utf-8")
         tree = Path(name) / "scene.oct"
-        tree.write_bytes(_ended([folder / "oconv", Path(name) / "scene.rad"], b"", more))
-        rays = "".join(f"{_said(p + HIGH * w)} {_said(-w)}\n" for p, w in zip(place, eye, strict=True))
-        told = _ended([folder / "rtrace", *OPTIONS.split(), tree], rays.encode("ascii"), more)
-    version = _ended([folder / "rtrace", "-version"], b"", more).decode("utf-8", "replace").split()[:2]
+        tree.write_bytes(_ended([folder / "oconv", "scene.rad"], b"", more, name))
+        told = _ended([folder / "rtrace", *OPTIONS.split(), tree], rays.encode("ascii"), more, name)
+        version = _ended([folder / "rtrace", "-version"], b"", more, name).decode("utf-8", "replace").split()[:2]
     values = np.frombuffer(told, "<f8").reshape(-1, 3)
     return values / np.maximum(wi[:, 2:], 1e-9), " ".join(["Radiance", *version[1:]])
 
@@ -181,12 +189,11 @@ def _said(vector: np.ndarray) -> str:
     return " ".join(f"{x:.17g}" for x in vector)
 
 
-def _ended(command: Sequence[Any], given: bytes, more: Mapping[str, str]) -> bytes:
-    """Standard output of a program of Radiance."""
+def _ended(command: Sequence[Any], given: bytes, more: Mapping[str, str], folder: str) -> bytes:
+    """Standard output of a program of Radiance that runs in a folder."""
+    options: dict[str, Any] = {"capture_output": True, "check": True, "env": os.environ | dict(more), "cwd": folder}
     try:
-        ended = subprocess.run(
-            list(map(str, command)), input=given, capture_output=True, check=True, env=os.environ | dict(more)
-        )
+        ended = subprocess.run(list(map(str, command)), input=given, **options)
     except (OSError, subprocess.CalledProcessError) as error:
         said = getattr(error, "stderr", b"") or str(error).encode()
         why = " ".join(said.decode("utf-8", "replace").split())[:200]

@@ -11,6 +11,7 @@ from fitmat.exports import (
     blender,
     cycles,
     gltf,
+    klems,
     materialx,
     materialx_shader,
     mitsuba,
@@ -132,6 +133,7 @@ TARGETS = {
     "pbrt": Target("pbrt-v4", pbrt.translated, pbrt.texts, _unexecuted, pbrt.notes, _facts),
     "unreal": Target("Unreal Engine's Default Lit", UNREAL.translated, UNREAL.texts, UNREAL.difference, _words, _facts),
     "unity": Target("Lit of Unity's URP", UNITY.translated, UNITY.texts, UNITY.difference, _words, _facts),
+    "klems": Target("a Klems matrix", klems.translated, klems.texts, klems.difference, klems.notes),
     "blender": Target(
         "Blender's Principled BSDF, in Cycles 5.0",
         blender.translated,

@@ -47,7 +47,7 @@ def rtrace() -> None:
 
 def apart(model: AbstractBRDF, run: AbstractBRDF, every: int) -> float:
     wi, wo = (w[::every] for w in directions())
-    values, executor = radiance.run(run, *exact(wi, wo))
+    values, executor = radiance.run(lambda name, frame: radiance.primitive(run, name, frame), *exact(wi, wo))
     assert executor.startswith("Radiance 6.") or executor.startswith("Radiance 5.")
     return compared(values, evaluate(model, *exact(wi, wo)), wi, wo, executor, least=radiance.LEAST).largest
 

@@ -17,7 +17,7 @@ TargetFlag = Annotated[
     typer.Option(
         "--to",
         help="What it is written for: glsl, glsl-330, mitsuba, materialx, openpbr, gltf, usd, pbrt, radiance, "
-        "blender, unreal, unity, osl, zemax, table, merl.",
+        "klems, blender, unreal, unity, osl, zemax, table, merl.",
         metavar="TARGET",
     ),
 ]
