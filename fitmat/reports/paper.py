@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from fitmat import arguments, files
 from fitmat.errors import OutputError
 from fitmat.reports import plot
-from fitmat.reports.drawn import KINDS, drawn_of, table
+from fitmat.reports.drawn import KINDS, table
 from fitmat.reports.pictures import refuse_picture, write_picture
 from fitmat.studies.result import Result
 from fitmat.studies.study import Study
@@ -27,6 +27,14 @@ STYLE: Mapping[Any, Any] = MappingProxyType(
     {"font.size": 8.0, "axes.titlesize": 8.0, "legend.fontsize": 7.0, "pdf.fonttype": 42, "svg.fonttype": "path"}
 )
 """Letters as small as journals print them; of a PDF with their font, of an SVG as outlines."""
+
+
+_OF_A_CHANNEL: Mapping[str, Callable[..., Figure]] = MappingProxyType(
+    {"curves": plot.curves, "residuals": plot.residuals, "lobes": plot.lobes, "slice": plot.slices}
+)
+_OF_ALL: Mapping[str, Callable[..., Figure]] = MappingProxyType(
+    {"albedo": plot.albedo, "match": plot.distances, "coverage": plot.coverage}
+)
 
 
 def save(
@@ -44,8 +52,8 @@ def save(
     Args:
         what: A study, or the result of one from `fitmat.load`.
         path: Of the picture; its ending says the format: .svg, .pdf or .png.
-        kind: "curves", "residuals", "albedo", "match" or "corner".
-        channel: Of curves and residuals, by its name or from 0.
+        kind: "curves", "residuals", "lobes", "slice", "albedo", "corner", "match" or "coverage".
+        channel: Of curves, residuals, lobes and slices, by its name or from 0.
         model: Of the corner; None for the last with draws.
         width_mm: Of the figure, 40 to 500.
         force: Replace the files.
@@ -64,7 +72,7 @@ def save(
     numbers = picture.with_suffix(".csv")
     if os.path.lexists(numbers) and not force:
         raise OutputError(f"{numbers}: already exists; choose another name, or --force to replace it.")
-    found = table(drawn_of(what), kind, channel=channel, model=model)
+    found = table(what, kind, channel=channel, model=model)
     files.write_text(numbers, found.write_csv())
     with mpl.rc_context(dict(STYLE)):
         write_picture(lambda: _draw(kind, what, channel, model, width_mm), picture, exact=True)
@@ -74,7 +82,6 @@ def save(
 def _draw(kind: str, what: Study | Result, channel: str | int, model: str | None, width_mm: float) -> Figure:
     if kind == "corner":
         return plot.corner(what, model, width_mm=width_mm)
-    if kind in ("curves", "residuals"):
-        drawing: Callable[..., Figure] = plot.curves if kind == "curves" else plot.residuals
-        return drawing(what, channel=channel, width_mm=width_mm)
-    return (plot.albedo if kind == "albedo" else plot.distances)(what, width_mm=width_mm)
+    if kind in _OF_A_CHANNEL:
+        return _OF_A_CHANNEL[kind](what, channel=channel, width_mm=width_mm)
+    return _OF_ALL[kind](what, width_mm=width_mm)

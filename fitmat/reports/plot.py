@@ -19,6 +19,9 @@ from fitmat.reports.axes import new_axes as new_axes
 from fitmat.reports.design_plot import design as design
 from fitmat.reports.drawn import channel_of, drawn_of, draws_of, match_of, sections, values_of
 from fitmat.reports.examination_plots import examination as examination
+from fitmat.reports.lobe_plots import coverage as coverage
+from fitmat.reports.lobe_plots import lobes as lobes
+from fitmat.reports.lobe_plots import slices as slices
 from fitmat.studies.result import Result
 from fitmat.studies.study import Study
 

@@ -104,8 +104,8 @@ def _material(record: Record) -> Card:
     numbers = ", ".join(parts) or "its parameters are not determined"
     words = f"Like {kind}: {numbers} ({name})." if kind else f"{name}: {numbers}."
     if fit["inadequate"]:
-        return Card("The material", CAUTION, "nearest model", words)
-    return Card("The material", GOOD, "best model", words)
+        return Card("The material", CAUTION, f"nearest model: {name}", words)
+    return Card("The material", GOOD, f"best model: {name}", words)
 
 
 def _phong(record: Record) -> Card:
@@ -187,7 +187,10 @@ def _trust(record: Record) -> Card:
         return Card(question, CAUTION, "no intervals", words)
     if misses:
         others = "; try --models all" if len(record["fits"]) <= FEW else ""
-        return Card(question, CAUTION, "with care", f"With care: {misses}; the intervals allow for that{others}.")
+        words = f"With care: {misses}; the intervals allow for that{others}."
+        if lost := fit["not_determined"]:
+            words = _within(lost, lambda few, verb: f"With care: {misses}, and {few} {verb} not determined{others}.")
+        return Card(question, CAUTION, "with care", words)
     if fit["not_determined"]:
         return Card(question, CAUTION, "in part", _lost(record, fit))
     if fit["adequacy"].startswith("adequacy unknown"):

@@ -1,5 +1,8 @@
 """The lobes are run in Chromium: what is drawn are the models' own values, at the places where it says so."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 import pytest
 from test_ball import MODELS, executed, given
@@ -53,8 +56,16 @@ def test_lobes_and_slices_are_the_models_values() -> None:
     found.across = lobes.shown;
     found.none = place.querySelectorAll(".slice circle").length;
     found.image = lobes.slices.map(({ canvas }) => canvas.getContext("2d").getImageData(45, 45, 1, 1).data[3]);
+    const { directions, surfaces, points, most } = lobes.solids;
+    const painted = () => lobes.solids.canvases.map((canvas) => canvas.toDataURL());
+    found.solid = { at: directions, surfaces, points, most };
+    const before = painted();
+    at("Orbit around", 0.9);
+    at("Orbit over", 1);
+    found.orbited = [lobes.solids.view, painted().map((url, k) => url !== before[k])];
     slide("α", 0.4);
     ball.draw();
+    found.solidMoved = lobes.solids.surfaces[1][0].some((part, axis) => Math.abs(part - surfaces[1][0][axis]) > 1e-3);
     found.moved = [ball.values[1][4], lobes.shown[1][0]];
     return found;
     """
@@ -84,6 +95,24 @@ def test_lobes_and_slices_are_the_models_values() -> None:
     assert found["none"] == 0
     assert found["image"] == [255, 255, 255]
     assert found["moved"][1] != found["across"][1][0]
+    solids(found, models)
+
+
+def solids(found: dict[str, Any], models: Sequence[AbstractBRDF]) -> None:
+    """Linear in channel r, light from 30°: a lobe reaches as far as the value is of the largest that is drawn."""
+    solid = found["solid"]
+    at = np.array([one["at"] for one in solid["at"]])
+    wo = np.stack([-at[:, 0], -at[:, 1], at[:, 2]], axis=1)  # x is the mirror side, which lies at azimuth 180°
+    wi = np.broadcast_to(from_angles(np.deg2rad([30.0]), np.zeros(1)), wo.shape)
+    values = [fm.evaluate(model, wi, wo)[:, 1] for model in models]
+    assert solid["most"] == pytest.approx(max(v.max() for v in values), rel=2e-2)
+    for value, surface in zip(values, solid["surfaces"], strict=True):
+        assert np.abs(np.linalg.norm(surface, axis=1) - value / solid["most"]).max() < 1e-2
+    points = np.array(solid["points"])
+    assert np.rad2deg(np.arctan2(points[:, 0], points[:, 2])) == pytest.approx([-30.0, 0.0], abs=1e-6)
+    assert np.linalg.norm(points, axis=1) * solid["most"] == pytest.approx([0.1, 0.2])
+    assert found["orbited"] == [[144, 90], [True, True]]
+    assert found["solidMoved"]
 
 
 @pytest.mark.study

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 import fitmat as fm
 from fitmat.errors import FitmatError
+from fitmat.maths.directions import from_angles
 from fitmat.reports import paper, plot
 from fitmat.reports.drawn import KINDS
 from fitmat.studies.study import Study
@@ -168,14 +169,51 @@ def test_the_numbers_beside_a_picture_are_those_in_it(studied: Study, tmp_path: 
     np.testing.assert_allclose(first["value"].cast(float).to_numpy(), expected, rtol=DIGITS)
 
 
+def test_lobes_go_around_the_normal_with_the_cube_root_as_radius(studied: Study) -> None:
+    figure = plot.lobes(studied, channel="g")
+    assert len(figure.axes) == 3
+    section, m = studied.findings[1].curves[1].section, studied.measurements
+    points = labelled(figure.axes[1])
+    np.testing.assert_allclose(points["measured"][:, 0], section.theta_o, rtol=DIGITS, atol=DIGITS)
+    np.testing.assert_allclose(points["measured"][:, 1] ** 3, m.value[section.rows, 1], rtol=3 * DIGITS)
+    angle, radius = points["lambert+ggx"].T
+    wi = from_angles(np.full(len(angle), section.theta_i), np.zeros(len(angle)))
+    found = fm.evaluate(studied.findings[1].fit.model, wi, from_angles(np.abs(angle), np.where(angle > 0, np.pi, 0.0)))
+    np.testing.assert_allclose(radius**3, found[:, 1], rtol=0.02)  # straight lines between points that are kept
+
+
+def test_a_slice_is_the_models_value_at_half_vector_and_difference(studied: Study, tmp_path: Path) -> None:
+    """A cell against fm.evaluate of directions built from θ_h and θ_d; a point against what was measured there."""
+    _, numbers = paper.save(studied, tmp_path / "a.png", "slice", channel="b")
+    cells = pl.read_csv(numbers, infer_schema_length=None).filter(pl.col("model") == "lambert+ggx")
+    at = cells.filter(pl.col("theta_h") == 12.5, pl.col("theta_d") == 40.5)
+    h = np.deg2rad(12.5)
+    wi, wo = (np.array([[np.sin(h + s), 0.0, np.cos(h + s)]]) for s in np.deg2rad([-40.5, 40.5]))
+    model = studied.findings[1].fit.model
+    assert at["value"].item() == pytest.approx(fm.evaluate(model, wi, wo)[0, 2], rel=DIGITS)
+    points, m = cells.filter(pl.col("measured_over_fitted").is_not_null()), studied.measurements
+    expected = (m.value / fm.evaluate(model, m.wi, m.wo))[:, 2]
+    np.testing.assert_allclose(np.sort(points["measured_over_fitted"]), np.sort(expected), rtol=3 * DIGITS)
+    assert cells.filter(pl.col("value").is_not_null())["theta_h"].len() == 89 * 90 // 2  # θ_h + θ_d < 90°
+
+
+def test_coverage_shows_every_geometry_once(studied: Study) -> None:
+    """Angles of half vector and difference by the formulas of the plane: half the sum and half the difference."""
+    found = plot.coverage(studied).axes[0].collections[0].get_offsets()
+    m = studied.measurements
+    light, sensor = np.rad2deg(m.theta_i), np.rad2deg(m.signed_theta_o)
+    expected = np.stack([np.abs(sensor - light), np.abs(sensor + light)], axis=1) / 2
+    assert sorted(map(tuple, np.round(np.asarray(found), 3))) == sorted(map(tuple, np.round(expected, 3)))
+
+
 def test_what_cannot_be_drawn_is_said(studied: Study, run: Path, tmp_path: Path) -> None:
     path = tmp_path / "a.svg"
     with pytest.raises(FitmatError, match=r"channel is the text 'red', expected one of r, g, b, or its place from 0"):
         paper.save(studied, path, channel="red")
     with pytest.raises(FitmatError, match=r"no draws of ggx; lambert\+blinn-phong, lambert\+ggx has some"):
         paper.save(studied, path, "corner", model="ggx")
-    with pytest.raises(FitmatError, match=r"kind is the text 'lobes', expected 'curves' or"):
-        paper.save(studied, path, "lobes")
+    with pytest.raises(FitmatError, match=r"kind is the text 'lobe', expected 'curves' or"):
+        paper.save(studied, path, "lobe")
     with pytest.raises(FitmatError, match=r"width_mm is 5000\.0, expected a number from 40 to 500"):
         paper.save(studied, path, width_mm=5000.0)
     with pytest.raises(FitmatError, match=r"no match to draw, expected an empirical and a microfacet model"):

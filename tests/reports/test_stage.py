@@ -90,8 +90,8 @@ def test_a_real_page_draws_ball_and_lobes(tmp_path: Path) -> None:
     section = re.search(r'<section id="ball"( hidden)?.*?</section>', shown, re.DOTALL)
     assert section is not None
     assert section[1] is None
-    assert section[0].count("<canvas") == 6
+    assert section[0].count("<canvas") == 8
     assert section[0].count("<polyline") == 2
     assert section[0].count("<circle") > 2 * 30
-    assert section[0].count('type="range"') == 7 + 8 + 1 + 1 + 4 + 2 + 1
+    assert section[0].count('type="range"') == 7 + 8 + 1 + 1 + 4 + 2 + 1 + 2
     assert "Exposure ×" in section[0]

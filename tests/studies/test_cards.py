@@ -165,6 +165,11 @@ def test_phong_serves_where_the_data_prefer_it() -> None:
             CAUTION,
             "With care: GGX misses the data by 8 × the",
         ),
+        (
+            {"inadequate": True, "misfit_ratio": 8.0, "doubts": ["a"], "not_determined": list("abcd")},
+            CAUTION,
+            "by 8 × the noise, and a, b, c and 1 more are not determined; try --models all.",
+        ),
         ({"inadequate": True, "intervals_hold": False, "doubts": ["a"]}, BAD, "No: "),
         ({"not_determined": ["eta", "ks"]}, CAUTION, "In part: eta, ks are not determined by these angles; `"),
         ({"not_determined": ["eta"]}, CAUTION, "In part: eta is not"),

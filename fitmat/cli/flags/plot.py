@@ -11,7 +11,8 @@ import typer
 WhatFlag = Annotated[
     str,
     typer.Option(
-        help="curves (points, fits, bands), residuals, albedo, match (distance by angle and region) or corner.",
+        help="curves (points, fits, bands), residuals, lobes (polar), slice (over half vector and difference), albedo, "
+        "match (distance by angle and region), corner, or coverage (what was measured).",
         metavar="PICTURE",
     ),
 ]
@@ -23,7 +24,9 @@ PaperFlag = Annotated[
 
 DrawnChannelFlag = Annotated[
     str | None,
-    typer.Option(help="Channel of curves and residuals; default the first.", metavar="NAME", show_default=False),
+    typer.Option(
+        help="Channel of curves, residuals, lobes and slice; default the first.", metavar="NAME", show_default=False
+    ),
 ]
 
 CornerModelFlag = Annotated[

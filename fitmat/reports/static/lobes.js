@@ -1,4 +1,5 @@
-// Lobes of two materials: in the plane of incidence, and as slices over theta_h and theta_d; with what was measured.
+// Lobes of two materials: in the plane of incidence, in space, and as slices over theta_h and theta_d; with what was
+// measured.
 // Every value is that of the ball's shaders, with the parameters that its sliders have now.
 "use strict";
 
@@ -38,12 +39,13 @@ function aboutHalf(thetaH, thetaD, phiD) {
 }
 
 class Lobes {
-    // Curves are measured sections: theta_i, phi_i, theta_o in degrees, and values of each channel.
-    constructor(root, ball, curves, channels) {
+    // Curves are measured sections: theta_i, phi_i, theta_o in degrees, and values of each channel; maps: see Solids.
+    constructor(root, ball, curves, channels, maps) {
         Object.assign(this, { root, ball, curves, channels, channel: 0, scale: "root", phiD: curves.length > 0 ? 0 : 90 });
         this.programs = ball.data.models.map(({ source }) => ball.gpu.program(source + VALUES));
         this.colour = ball.data.channels.map((name) => channels.indexOf(name));
         this.thetaI = this.measured.length > 0 ? this.measured[Math.floor(this.measured.length / 2)] : 45;
+        this.solids = new Solids(this, maps);
         this.build();
         this.draw();
         ball.drawnWith.push(() => this.draw());
@@ -79,7 +81,7 @@ class Lobes {
         const scale = choice("Radius", scales, (value) => this.put("scale", value));
         const plane = choice("Slice", { 0: "in the plane of incidence", 90: "across it, as BRDF Explorer" }, (value) => this.put("phiD", Number(value)));
         plane.select.value = this.phiD;
-        const rows = [this.incidence, scale, plane];
+        const rows = [this.incidence, scale, plane, ...this.solids.sliders];
         if (this.ball.data.channels.length > 1) {
             const named = Object.fromEntries(this.ball.data.channels.map((name, k) => [k, name]));
             rows.push(choice("Channel", named, (value) => this.put("channel", Number(value))));
@@ -94,6 +96,7 @@ class Lobes {
         this.read = made("p", { class: "said", "aria-live": "polite" });
         this.root.replaceChildren(
             made("div", { class: "panels" }, lobe, made("fieldset", {}, made("legend", {}, "Lobes"), ...rows.map(({ row }) => row), made("small", {}, known))),
+            made("div", { class: "solids" }, ...this.solids.figures),
             made("div", { class: "slices" }, ...this.slices.map(({ figure }) => figure)),
             this.read,
         );
@@ -112,6 +115,7 @@ class Lobes {
         this.thetaI = near ?? x;
         this.incidence.set(this.thetaI);
         this.lobe();
+        this.solids.draw();
     }
 
     put(name, value) {
@@ -121,6 +125,7 @@ class Lobes {
 
     draw() {
         this.lobe();
+        this.solids.draw();
         this.images();
     }
 
@@ -201,7 +206,7 @@ class Lobes {
 }
 
 // Puts the lobes of a ball's materials into an element.
-function mountLobes(root, ball, curves, channels) {
-    root.lobes = new Lobes(root, ball, curves, channels);
+function mountLobes(root, ball, curves, channels, maps = []) {
+    root.lobes = new Lobes(root, ball, curves, channels, maps);
     return root.lobes;
 }
