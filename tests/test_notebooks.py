@@ -14,6 +14,9 @@ FOLDER = Path(__file__).parents[1] / "notebooks"
 
 NOTEBOOKS = pytest.mark.parametrize("path", sorted(FOLDER.glob("*.ipynb")), ids=lambda path: path.stem)
 
+CONCLUDES = {"04_colour_of_metals": "just noticeable"}
+"""What a notebook says that compares no two models of a file."""
+
 LARGEST, LONGEST = 400_000, 2_000
 """Bytes of a file, and characters of what a result shows as plain text."""
 
@@ -45,5 +48,5 @@ def test_is_stored_as_it_ran(path: Path) -> None:
 def test_runs(path: Path) -> None:
     notebook = nbformat.read(path, as_version=4)
     NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(FOLDER)}}).execute()
-    assert "hemisphere" in str([cell.outputs for cell in code(notebook)])
+    assert CONCLUDES.get(path.stem, "hemisphere") in str([cell.outputs for cell in code(notebook)])
     assert sum("image/png" in text for text in shown(notebook)) >= 4

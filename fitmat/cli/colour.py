@@ -55,6 +55,8 @@ def page(found: InRgb) -> None:
         for space, words in SPACES.items():
             reflected.add_row(f"{name}, {words}", *_three(linear(values @ FROM_SRGB.T, space)))
     reflected.add_row("edge tint, F82 over Schlick's", *_three(found.tint))
+    reflected.add_row("η, exact with one a channel", *_three(np.real(found.indices)))
+    reflected.add_row("κ", *_three(np.imag(found.indices)))
     errors = Table("", *(f"{angle}°" for angle in AT), "most", "diffuse", box=None, pad_edge=False)
     for way in WAYS:
         at = [f"{found.delta_e_2000[way][angle]:.2f}" for angle in AT]

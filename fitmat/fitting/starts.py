@@ -86,7 +86,8 @@ def _solve_nodes(
 ) -> tuple[Float[np.ndarray, "k p"], Float[np.ndarray, " k"]]:
     """For every node: the vector with its weights solved, and its cost in the transform of the likelihood.
 
-    A weight with one number a channel counts in that channel only: one look at the model serves all its numbers.
+    A weight with one number a channel counts in that channel only, so that one look at the model serves all its
+    numbers; the tints of Disney's models, which depend on all channels, are those of white in a start.
     """
     dark = nodes.copy()
     for entry in weights:

@@ -9,7 +9,7 @@ import dataclasses
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Complex, Float
 
 from fitmat.colour.channels import sensitivities
 from fitmat.colour.differences import JUST_NOTICEABLE, delta_e_2000
@@ -54,6 +54,7 @@ class InRgb:
         xyz: Of the reflected light, white Y = 1, at `ANGLES`, (a, 3).
         f0: Linear sRGB at normal incidence under D65, (3,); may be above 1.
         f82: The same at cos θ = 1/7, 81.8°.
+        indices: η + iκ of each channel whose curve comes closest (`spectral.channel_indices`), (3,).
         delta_e_2000: `WAYS` → colour difference from the spectral truth at `ANGLES`, (a,).
         diffuse: `WAYS` → the same under uniform light from everywhere, ∫ F 2 cos θ sin θ dθ.
     """
@@ -63,6 +64,7 @@ class InRgb:
     xyz: Float[np.ndarray, "a 3"]
     f0: Float[np.ndarray, "3"]
     f82: Float[np.ndarray, "3"]
+    indices: Complex[np.ndarray, "3"]
     delta_e_2000: dict[str, Float[np.ndarray, " a"]]
     diffuse: dict[str, float]
 
@@ -116,21 +118,21 @@ def fresnel_in_rgb(material: str, illuminant: str = "D65") -> InRgb:
     to_xyz = linear(white(illuminant)) * FROM_SRGB
     count = len(ANGLES)
     apart, uniform = {}, {}
-    for way, curve in _curves(material, f0, f82).items():
+    closest = spectral.channel_indices(material, RGB)
+    for way, curve in _curves(material, f0, f82, closest).items():
         made = curve(cos[:, None]) @ to_xyz.T
         apart[way] = delta_e_2000(made[:count], truth[:count], white(illuminant))
         means = [diffuse @ colours[count + 1 :] for colours in (made, truth)]
         uniform[way] = float(delta_e_2000(means[0], means[1], white(illuminant)))
-    return InRgb(material, illuminant, truth[:count], f0, f82, apart, uniform)
+    return InRgb(material, illuminant, truth[:count], f0, f82, closest, apart, uniform)
 
 
 def _curves(
-    material: str, f0: Float[np.ndarray, "3"], f82: Float[np.ndarray, "3"]
+    material: str, f0: Float[np.ndarray, "3"], f82: Float[np.ndarray, "3"], closest: Complex[np.ndarray, "3"]
 ) -> dict[str, Callable[[np.ndarray], np.ndarray]]:
     """Each of `WAYS` as a function of the cosine, (a, 1) → (a, 3)."""
     rows, every = sensitivities(), spectral.indices(material)
     lines = every[np.searchsorted(wavelengths(), channel_wavelengths(RGB))]
-    closest = spectral.channel_indices(material, RGB)
     averaged = rows @ every
     terms = belcour.weights(np.real(every), np.imag(every)) @ rows.T
 

@@ -36,5 +36,5 @@ def fresnel(found: InRgb) -> Figure:
     below.axhline(JUST_NOTICEABLE, color=BLACK, linewidth=0.5)
     below.annotate("just noticeable", (1.0, JUST_NOTICEABLE), va="bottom", fontsize=7)
     below.set(xlabel="angle of incidence (°)", ylabel="ΔE2000 from the spectrum", xlim=(0, 89), ylim=(0, None))
-    below.legend(frameon=False, ncols=2)
+    figure.legend(*below.get_legend_handles_labels(), loc="outside lower center", frameon=False, ncols=6, fontsize=7)
     return figure
