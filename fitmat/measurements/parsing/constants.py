@@ -14,12 +14,10 @@ from fitmat.measurements.options import ANGLES, ELEVATIONS
 from fitmat.measurements.parsing.columns import roles
 from fitmat.measurements.parsing.names import Role, role
 from fitmat.measurements.parsing.table import Table
+from fitmat.measurements.parsing.wavelengths import SHORTEST
 
 CONSTANTS = (*ANGLES, "wavelength")
 """What can be said to be the same in every row."""
-
-SHORTEST = 100.0
-"""Number from which a wavelength is one in nm; smaller ones are in µm, or in another unit."""
 
 
 def with_constants(

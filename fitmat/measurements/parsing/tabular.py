@@ -13,9 +13,10 @@ from fitmat.measurements.options import Options
 from fitmat.measurements.parsing import contents, scales, units, unused
 from fitmat.measurements.parsing.angles import ROUNDING, directions, unsaid_side
 from fitmat.measurements.parsing.columns import Columns, assign
-from fitmat.measurements.parsing.constants import SHORTEST, with_constants
+from fitmat.measurements.parsing.constants import with_constants
 from fitmat.measurements.parsing.recording import Recording, pivot, sentinels
 from fitmat.measurements.parsing.table import Table
+from fitmat.measurements.parsing.wavelengths import SHORTEST, refuse_unlike
 from fitmat.measurements.samples import default_channels
 
 HIDDEN = 0.3
@@ -49,6 +50,7 @@ def laid_out(table: Table, columns: str | Mapping[str, str | int] | None, option
 
 def recorded(table: Table, layout: Columns, options: Options, *, doubted: bool) -> Recording:
     """The recording of a table whose columns are known, from `laid_out`; arguments and errors as `recording`."""
+    refuse_unlike(table.source, tuple(layout.values))
     angles, assumed = directions(table, layout.angles, options)
     theta_i, phi_i, theta_o, phi_o = angles.T
     scale = _scale(table, layout, options)
