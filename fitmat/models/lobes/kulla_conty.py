@@ -8,17 +8,16 @@ from typing import ClassVar
 import equinox as eqx
 import jax.numpy as jnp
 
-from fitmat._types import Scalar, Spectrum, Vec3
+from fitmat._types import Spectrum, Vec3
 from fitmat.maths.directions import above
-from fitmat.models.base import AbstractSpecular, specular_weight
 from fitmat.models.glsl import scalar, spectrum
-from fitmat.models.lobes.microfacet import Microfacet
-from fitmat.models.terms.distributions import GGX, AbstractDistribution, Isotropic, Masking
+from fitmat.models.lobes.microfacet import AbstractMicrofacet
+from fitmat.models.terms.distributions import Isotropic
 from fitmat.models.terms.energy import missing
-from fitmat.models.terms.fresnel import AbstractFresnel, Dielectric, average
+from fitmat.models.terms.fresnel import average
 
 
-class KullaConty(AbstractSpecular):
+class KullaConty(AbstractMicrofacet):
     """Microfacet reflection that conserves energy (`ggx-kc`, `beckmann-kc`), after Kulla & Conty 2017.
 
     f = ks (F D G/(4 c_i c_o) + F_ms (1 − E(c_i))(1 − E(c_o))/(π (1 − E_avg))),
@@ -46,42 +45,30 @@ class KullaConty(AbstractSpecular):
     label: ClassVar[str] = "{distribution.label}-kc{fresnel.suffix}"
     numbers: ClassVar[tuple[str, ...]] = ("alpha", "eta", "f0", "f82", "kappa")
 
-    ks: Spectrum = specular_weight()
-    roughness: Isotropic = eqx.field(default_factory=Isotropic)
-    fresnel: AbstractFresnel = eqx.field(default_factory=Dielectric)
-    distribution: AbstractDistribution = eqx.field(default_factory=GGX)
-    masking: Masking = eqx.field(static=True, default="correlated")
+    roughness: Isotropic = eqx.field(default_factory=Isotropic)  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """Single scattering plus what the other facets return."""
-        single = self._single()(wi, wo)
+        single = self.single(wi, wo)
         lost, f_avg = missing(self.distribution, self.masking, self.roughness.alpha), average(self.fresnel)
         mean = lost.average()
         f_ms = f_avg**2 * (1.0 - mean) / (1.0 - f_avg * mean)
         multiple = f_ms * lost(wi[2]) * lost(wo[2]) / (jnp.pi * mean)
         return single + jnp.where(above(wi, wo), self.ks * multiple, 0.0)
 
-    def _single(self) -> Microfacet:
-        return Microfacet(self.ks, self.roughness, self.fresnel, self.distribution, self.masking)
-
     def glsl(self) -> str:
         """The same; what depends on no direction is a number."""
         lost, f_avg = missing(self.distribution, self.masking, self.roughness.alpha), average(self.fresnel)
         mean = lost.average()
         f_ms = f_avg**2 * (1.0 - mean) / (1.0 - f_avg * mean)
-        single = self._single().glsl().replace("vec3 lobe(", "vec3 single(")
         return (
             scalar("mean", mean)
             + spectrum("f_ms", f_ms)
             + lost.glsl()
-            + single
+            + self.single_glsl()
             + """
 vec3 lobe(vec3 wi, vec3 wo) {
     return single(wi, wo) + ks * f_ms * lost(wi.z) * lost(wo.z) / (PI * mean);
 }
 """
         )
-
-    def width(self) -> Scalar:
-        """Alpha itself."""
-        return self.roughness.alpha

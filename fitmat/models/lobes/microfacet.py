@@ -20,7 +20,40 @@ from fitmat.models.terms.distributions import (
 from fitmat.models.terms.fresnel import AbstractFresnel, Dielectric
 
 
-class Microfacet(AbstractSpecular):
+class AbstractMicrofacet(AbstractSpecular):
+    """A lobe of tiny mirrors: what single scattering reflects, and what a lobe may make of it."""
+
+    ks: Spectrum = specular_weight()
+    roughness: AbstractRoughness = eqx.field(default_factory=Isotropic)
+    fresnel: AbstractFresnel = eqx.field(default_factory=Dielectric)
+    distribution: AbstractDistribution = eqx.field(default_factory=GGX)
+    masking: Masking = eqx.field(static=True, default="correlated")
+
+    def single(self, wi: Vec3, wo: Vec3) -> Spectrum:
+        """ks F D G/(4 c_i c_o)."""
+        p, slopes = self.roughness.pair(wi, wo), self.roughness.slopes
+        density = self.distribution.density(p.h, slopes)
+        g_cc = visibility(self.distribution, self.masking, slopes, p)
+        return jnp.where(above(wi, wo), self.ks * self.fresnel(p.cos_d) * density * g_cc / 4.0, 0.0)
+
+    def single_glsl(self) -> str:
+        """The same."""
+        return (
+            VISIBILITY[self.masking]
+            + """
+vec3 single(vec3 wi, vec3 wo) {
+    Pair p = facets(wi, wo);
+    return ks * fresnel(p.cos_d) * density(p.h) * visibility(p) / 4.0;  // visibility is G/(c_i c_o)
+}
+"""
+        )
+
+    def width(self) -> Scalar:
+        """The smaller slope."""
+        return self.roughness.width()
+
+
+class Microfacet(AbstractMicrofacet):
     """A surface of tiny mirrors with GGX (`ggx`) or Beckmann (`beckmann`) normals.
 
     f = ks F(c_d) D(h) G(ω_i, ω_o)/(4 c_i c_o)
@@ -46,31 +79,10 @@ class Microfacet(AbstractSpecular):
 
     label: ClassVar[str] = "{distribution.label}{roughness.suffix}{fresnel.suffix}"
 
-    ks: Spectrum = specular_weight()
-    roughness: AbstractRoughness = eqx.field(default_factory=Isotropic)
-    fresnel: AbstractFresnel = eqx.field(default_factory=Dielectric)
-    distribution: AbstractDistribution = eqx.field(default_factory=GGX)
-    masking: Masking = eqx.field(static=True, default="correlated")
-
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
-        """ks F D G/(4 c_i c_o)."""
-        p, slopes = self.roughness.pair(wi, wo), self.roughness.slopes
-        density = self.distribution.density(p.h, slopes)
-        g_cc = visibility(self.distribution, self.masking, slopes, p)
-        return jnp.where(above(wi, wo), self.ks * self.fresnel(p.cos_d) * density * g_cc / 4.0, 0.0)
+        """Single scattering."""
+        return self.single(wi, wo)
 
     def glsl(self) -> str:
         """The same."""
-        return (
-            VISIBILITY[self.masking]
-            + """
-vec3 lobe(vec3 wi, vec3 wo) {
-    Pair p = facets(wi, wo);
-    return ks * fresnel(p.cos_d) * density(p.h) * visibility(p) / 4.0;  // visibility is G/(c_i c_o)
-}
-"""
-        )
-
-    def width(self) -> Scalar:
-        """The smaller slope."""
-        return self.roughness.width()
+        return self.single_glsl().replace("vec3 single(", "vec3 lobe(")

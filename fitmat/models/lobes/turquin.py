@@ -9,16 +9,14 @@ from typing import ClassVar
 
 import equinox as eqx
 
-from fitmat._types import Scalar, Spectrum, Vec3
-from fitmat.models.base import AbstractSpecular, specular_weight
+from fitmat._types import Spectrum, Vec3
 from fitmat.models.glsl import spectrum
-from fitmat.models.lobes.microfacet import Microfacet
-from fitmat.models.terms.distributions import GGX, AbstractDistribution, Isotropic, Masking
+from fitmat.models.lobes.microfacet import AbstractMicrofacet
+from fitmat.models.terms.distributions import Isotropic
 from fitmat.models.terms.energy import Missing, missing
-from fitmat.models.terms.fresnel import AbstractFresnel, Dielectric
 
 
-class Turquin(AbstractSpecular):
+class Turquin(AbstractMicrofacet):
     """Microfacet reflection with the energy of multiple scattering as today's renderers have it (`ggx-turquin`).
 
     f = ks F D G/(4 c_i c_o) (1 + F0 (1 − E(c_o))/E(c_o))
@@ -52,37 +50,25 @@ class Turquin(AbstractSpecular):
         }
     )
 
-    ks: Spectrum = specular_weight()
-    roughness: Isotropic = eqx.field(default_factory=Isotropic)
-    fresnel: AbstractFresnel = eqx.field(default_factory=Dielectric)
-    distribution: AbstractDistribution = eqx.field(default_factory=GGX)
-    masking: Masking = eqx.field(static=True, default="correlated")
+    roughness: Isotropic = eqx.field(default_factory=Isotropic)  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """Single scattering times 1 + F0 (1 − E)/E."""
-        single, lost = self._single()(wi, wo), self._missing()(wo[2])
+        single, lost = self.single(wi, wo), self._missing()(wo[2])
         return single * (1.0 + self.fresnel.normal_reflectance() * lost / (1.0 - lost))
-
-    def _single(self) -> Microfacet:
-        return Microfacet(self.ks, self.roughness, self.fresnel, self.distribution, self.masking)
 
     def _missing(self) -> Missing:
         return missing(self.distribution, self.masking, self.roughness.alpha)
 
     def glsl(self) -> str:
         """The same."""
-        single = self._single().glsl().replace("vec3 lobe(", "vec3 single(")
         return (
             spectrum("normal", self.fresnel.normal_reflectance())
             + self._missing().glsl()
-            + single
+            + self.single_glsl()
             + """
 vec3 lobe(vec3 wi, vec3 wo) {
     return single(wi, wo) * (1.0 + normal * lost(wo.z) / (1.0 - lost(wo.z)));
 }
 """
         )
-
-    def width(self) -> Scalar:
-        """Alpha itself."""
-        return self.roughness.alpha
