@@ -10,6 +10,7 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
+import equinox as eqx
 import numpy as np
 from rich.console import Console
 from rich.progress import track
@@ -20,7 +21,7 @@ from fitmat.fitting.losses import LOSSES
 from fitmat.maths import programs
 from fitmat.models import laws
 from fitmat.models.estimated import Walked
-from fitmat.models.registry import LOBES, WALKS, Lobe, lobe_names, model
+from fitmat.models.registry import LOBES, OVER, WALKS, Lobe, lobe_names, model
 
 FRESNEL, TRANSMISSION, HEITZ = "fresnel", "transmission", "heitz"
 """Pages of no lobe: the Fresnel terms compared, what a dielectric interface lets through, and multiple scattering."""
@@ -159,10 +160,18 @@ def check(*, seed: int = 0, only: Callable[[str], bool] = lambda name: True) -> 
     """
     table = _table("model", *laws.LAWS)
     names = [example for name in LOBES if only(name) for example in laws.examples(name)]
-    workers = min(len(names), os.cpu_count() or 1)
-    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:  # most of it is tracing, one thread at a time
-        checked = zip(names, pool.map(_measured, names, itertools.repeat(seed)), strict=True)
-        measured = list(track(checked, "checking", len(names), console=Console(stderr=True), transient=True))
+    alike: dict[str, list[str]] = {}
+    for name in names:
+        lobe = name.rpartition(OVER)[2]
+        alike.setdefault(name.removesuffix(LOBES[lobe].fresnel_suffix(lobe)), []).append(name)
+    # Covers first, which take longest. Lobes that differ in their Fresnel term alone are the same white one.
+    groups = sorted(alike.values(), key=lambda group: OVER not in group[0])
+    with ProcessPoolExecutor(min(len(groups), os.cpu_count() or 1), get_context("spawn")) as pool:
+        # most of it is tracing, one thread at a time
+        checked = pool.map(_measured, groups, itertools.repeat(seed))
+        progress = track(checked, "checking", len(groups), console=Console(stderr=True), transient=True)
+        found_of = {name: found for some in progress for name, found in some.items()}
+    measured = [(name, found_of[name]) for name in names]
     broken: dict[bool, list[str]] = {True: [], False: []}
     for name, found in measured:
         declared = _exceptions(name)
@@ -185,14 +194,17 @@ def _exceptions(name: str) -> set[str]:
     return lost.union(*(LOBES[part].breaks for part in parts))
 
 
-def _measured(name: str, seed: int) -> dict[str, laws.Finding]:
-    """The laws of one model, in a process that holds no more than one model's programs."""
+def _measured(group: list[str], seed: int) -> dict[str, dict[str, laws.Finding]]:
+    """The laws of models that may be the same white one, in a process that holds no more than one model's programs."""
     import jax
 
     jax.config.update("jax_enable_x64", True)
-    with programs.hasty():
-        found = laws.check(model(name), seed=seed)
-    programs.clear()
+    found: dict[str, dict[str, laws.Finding]] = {}
+    for name in group:
+        alike = found and eqx.tree_equal(laws.white(model(name)), laws.white(model(group[0])))
+        with programs.hasty():
+            found[name] = laws.check(model(name), seed=seed, furnace=found[group[0]]["furnace"] if alike else None)
+        programs.clear()
     return found
 
 
