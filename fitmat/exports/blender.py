@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fitmat.exports.closest import Closest, closest, coloured
-from fitmat.exports.cycles_models import template
+from fitmat.exports.cycles_models import Coated, template
 from fitmat.exports.material import Chosen
 
 SOCKETS = {
@@ -22,6 +22,8 @@ SOCKETS = {
     "Diffuse Roughness": "diffuse_roughness",
     "Anisotropic": "anisotropic",
     "Anisotropic Rotation": "rotation",
+    "Coat Weight": "weight",
+    "Coat Roughness": "alpha",
 }
 """Inputs of the node → parameters of the model; those that it has not stay out."""
 
@@ -62,19 +64,32 @@ def translated(chosen: Chosen) -> Closest:
     return closest(chosen, *template(chosen.model, coloured(chosen, "Blender")))
 
 
+def notes(chosen: Chosen, found: Closest) -> list[str]:
+    """What differs from the model, as sentences."""
+    del chosen
+    mirror = "The mirror image in the polished coat is written as a coat of roughness 0 and index 1.5."
+    polished = isinstance(found.model, Coated) and found.model.coat is None
+    return [*found.words, *([mirror] if polished else [])]
+
+
 def code(name: str, found: Closest) -> str:
     """Python for Blender that makes `material`."""
     brushed = "rotation" in found.values
-    values = {socket: _value(socket, found.values[key]) for socket, key in SOCKETS.items() if key in found.values}
+    polished = {"Coat Roughness": 0.0} if "weight" in found.values else {}
+    values = polished | {
+        socket: _value(socket, found.values[key]) for socket, key in SOCKETS.items() if key in found.values
+    }
     made = CODE.format(values=json.dumps(values, indent=4), name=json.dumps(name))
     return made + BRUSHED * brushed
 
 
 def _value(socket: str, value: Any) -> float | list[float]:
-    """As the socket has it: colours with an alpha, turns as a fraction of one."""
+    """As the socket has it: colours with an alpha, turns as a fraction of one, roughness of a coat."""
     if socket in COLOURS:
         return [*np.broadcast_to(value, (3,)).tolist(), 1.0]
-    return float(value[0]) / 360.0 % 1.0 if socket == "Anisotropic Rotation" else float(value[0])
+    number = float(value[0])
+    turned, root = number / 360.0 % 1.0, abs(number) ** 0.5
+    return {"Anisotropic Rotation": turned, "Coat Roughness": root}.get(socket, number)
 
 
 def texts(name: str, header: Sequence[str], found: Closest) -> dict[str, str]:

@@ -1,6 +1,6 @@
 """Blender's Principled BSDF as Cycles computes it, a model of the library: opaque base and specular, single scattering.
 
-Coat, sheen, subsurface, transmission and thin film are not here, nor the distribution Multiscatter GGX.
+Its coat is here as a model around it; sheen, subsurface, transmission, thin film and Multiscatter GGX are not.
 """
 
 import functools
@@ -20,11 +20,24 @@ from fitmat.maths.directions import above, rotated
 from fitmat.models.base import AbstractBRDF, AbstractLobe
 from fitmat.models.lobes.oren_nayar import EnergyPreservingOrenNayar
 from fitmat.models.parameters import param
-from fitmat.models.terms.distributions import GGX, Slopes, visibility
-from fitmat.models.terms.fresnel import COS_82, dielectric, eta_from_f0, f0_from_eta, hoffman, schlick
+from fitmat.models.terms.distributions import GGX, Isotropic, Slopes, visibility
+from fitmat.models.terms.energy import missing
+from fitmat.models.terms.fresnel import (
+    COS_82,
+    Dielectric,
+    average,
+    dielectric,
+    eta_from_f0,
+    f0_from_eta,
+    hoffman,
+    schlick,
+)
 
 SIZE = 16
 """Of Cycles' table in each of roughness, cosine and ∜F0, between which it is interpolated as there."""
+
+COAT_IOR = 1.5
+"""Of Blender's coat, as it comes."""
 
 NODES = 3000
 """Of the quadrature over visible normals."""
@@ -118,32 +131,91 @@ class Principled(AbstractLobe):
         f0 = f0_from_eta(self.ior)
         share = (dielectric(p.cos_d, self.ior) - f0) / jnp.maximum(1.0 - f0, 1e-6)
         glossy = _between(f0 * self.specular_tint, share)
-        taken = _between(f0 * jnp.max(self.specular_tint), self._share(wo, f0))
+        taken = _between(f0 * jnp.max(self.specular_tint), averaged(wo, f0, self.shape.roughness))
         below = EnergyPreservingOrenNayar(self.base_color, self.diffuse_roughness)
         once, more = below.bounces(wi, wo)
         diffuse = self.base_color * (once + below.multiple() * more)
         coated = glossy * mirror + (1.0 - jnp.clip(taken, 0.0, 1.0)) * diffuse
         return jnp.where(above(wi, wo), (1.0 - self.metallic) * coated + self.metallic * metal * mirror, 0.0)
 
-    def _share(self, wo: Vec3, f0: Scalar) -> Scalar:
-        """`table` between its entries."""
-        place = jnp.maximum(f0, 1e-16) ** 0.25, jnp.clip(wo[2], 0.0, 1.0), self.shape.roughness
-        at = [(SIZE - 1.0) * jnp.asarray(x) for x in place]
-        return jax.scipy.ndimage.map_coordinates(jnp.asarray(table()), at, order=1, mode="nearest")
-
     def width(self) -> Scalar:
         """The smaller slope."""
         return self.shape.width()
+
+
+class Coated(AbstractLobe):
+    """Coat of the Principled BSDF, of index 1.5, untinted.
+
+    f = k F_d D V K + (1 − k A(c_o) K E) f_base,  A = F0 + (1 − F0) share,  K = 1 + F_ms (1 − E(c_o))/E(c_o)
+
+    E is the albedo of GGX, Ē its mean and F_ms = F̄ Ē/(1 − F̄ (1 − Ē)): a coat keeps the light of several bounces,
+    whatever the distribution. Of a polished coat (roughness 0) only what it takes from the base is a value of f.
+
+    Parameters: coat k, 0 to 1; of a rough coat coat.alpha, the square of Coat Roughness.
+
+    Reference: as `Principled`.
+    """
+
+    label: ClassVar[str] = "coat"
+    breaks: ClassVar[Mapping[str, str]] = MappingProxyType({"reciprocal": "its coat takes from the eye's side alone"})
+
+    base: Principled
+    weight: Scalar = fraction("k", 1.0, (0.9,), "strength of the coat")
+    coat: Isotropic | None = None
+
+    @property
+    def name(self) -> str:
+        """That of the base under a coat."""
+        return f"coat-over-{self.base.name}"
+
+    @property
+    def isotropic(self) -> bool:
+        """Where the base is."""
+        return self.base.isotropic
+
+    def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
+        """The base seen through the coat, and the coat."""
+        f0, kept, albedo = f0_from_eta(jnp.asarray(COAT_IOR)), jnp.ones(()), jnp.ones(())
+        rough = jnp.zeros(()) if self.coat is None else jnp.sqrt(self.coat.alpha)
+        if self.coat is not None:
+            lost, mean = missing(GGX(), "correlated", self.coat.alpha), average(Dielectric())
+            albedo, every = 1.0 - lost(jnp.clip(wo[2], 0.0, 1.0)), 1.0 - lost.average()
+            kept = 1.0 + mean * every / (1.0 - mean * (1.0 - every)) * (1.0 - albedo) / albedo
+        taken = self.weight * _between(f0, averaged(wo, f0, rough)) * kept * albedo
+        below = (1.0 - taken) * self.base(wi, wo)
+        if self.coat is None:
+            return below
+        p, slopes = self.coat.pair(wi, wo), self.coat.slopes
+        mirror = GGX().density(p.h, slopes) * visibility(GGX(), "correlated", slopes, p) / 4.0
+        coat = self.weight * dielectric(p.cos_d, jnp.asarray(COAT_IOR)) * mirror * kept
+        return below + jnp.where(above(wi, wo), coat, 0.0)
+
+    def width(self) -> Scalar:
+        """The narrower of both."""
+        base = self.base.width()
+        return base if self.coat is None else jnp.minimum(base, self.coat.width())
+
+
+def averaged(wo: Vec3, f0: Scalar, rough: Scalar) -> Scalar:
+    """`table` between its entries."""
+    place = jnp.maximum(f0, 1e-16) ** 0.25, jnp.clip(wo[2], 0.0, 1.0), rough
+    at = [(SIZE - 1.0) * jnp.asarray(x) for x in place]
+    return jax.scipy.ndimage.map_coordinates(jnp.asarray(table()), at, order=1, mode="nearest")
 
 
 def _between(f0: Spectrum, share: Scalar) -> Spectrum:
     return f0 + (1.0 - f0) * jnp.clip(share, 0.0, 1.0)
 
 
-def template(model: AbstractBRDF, channels: int) -> tuple[Principled, list[dict[str, float]]]:
-    """The model with what a model has, and what of it is held: as a metal, and as a dielectric."""
+def template(model: AbstractBRDF, channels: int) -> tuple[AbstractBRDF, list[dict[str, float]]]:
+    """The model with what a model has, and what of it is held: as a metal, and as a dielectric; a polished coat."""
     given: dict[str, Any] = {"base_color": np.full(channels, 0.5), "specular_tint": np.full(channels, 1.0)}
     held = {} if model.isotropic else {"rotation": tangent(model)}
     metal = {"metallic": 1.0, "diffuse_roughness": 0.0, "ior": 1.5}
-    into = Principled(**given, shape=Squared() if model.isotropic else Drawn())
+    base = Principled(**given, shape=Squared() if model.isotropic else Drawn())
+    into: AbstractBRDF = base
+    if model.name.startswith("rough-varnish-over-"):
+        into = Coated(base, coat=Isotropic())
+    elif model.name.startswith("varnish-over-"):
+        into, held = Coated(base), held | {"weight": 1.0}
     return into, [held | metal, held | {"metallic": 0.0}]

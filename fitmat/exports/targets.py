@@ -139,7 +139,7 @@ TARGETS = {
         blender.translated,
         blender.texts,
         lambda chosen, found: cycles.difference(chosen.model, blender.code("material", found)),
-        _words,
+        blender.notes,
         _facts,
     ),
     "osl": Target(

@@ -15,10 +15,11 @@ import fitmat as fm
 from fitmat.errors import ModelError, OutputError
 from fitmat.exports import blender, cycles
 from fitmat.exports.closest import Closest
-from fitmat.exports.cycles_models import Drawn, Principled
+from fitmat.exports.cycles_models import Coated, Drawn, Principled
 from fitmat.exports.metallic_roughness import Squared
 from fitmat.exports.verification import TOLERANCE
 from fitmat.models.base import AbstractBRDF, evaluate
+from fitmat.models.terms.distributions import Isotropic
 
 C, T = np.array([0.8, 0.4, 0.1]), np.array([0.9, 0.5, 0.3])
 
@@ -37,11 +38,15 @@ def drawn(**values: Any) -> Drawn:
 
 
 SATIN = node(squared(0.4), ior=1.7, diffuse_roughness=0.6)
-RUN: dict[str, Principled] = {
+HALF: dict[str, Any] = {"weight": 0.5}
+THIN: dict[str, Any] = {"alpha": 0.09}
+RUN: dict[str, Principled | Coated] = {
     "satin": SATIN,
     "glossy": node(squared(0.15), ior=2.0),
     "metal": node(squared(0.3), metallic=1.0),
     "brushed": node(drawn(roughness=0.4, anisotropic=0.6, rotation=30.0), metallic=1.0),
+    "varnished": Coated(SATIN, **HALF, coat=Isotropic(**THIN)),
+    "polished": Coated(SATIN, **HALF),
 }
 
 
@@ -79,7 +84,9 @@ def test_cycles_has_the_models_values(name: str) -> None:
     found = cycles.difference(RUN[name], made)
     assert found is not None
     assert found.largest < TOLERANCE, found.words
-    rough = f'"Roughness": {float(RUN[name].shape.roughness)}'
+    model = RUN[name]
+    base = model.base if isinstance(model, Coated) else model
+    rough = f'"Roughness": {float(base.shape.roughness)}'
     assert rough in made
     other = cycles.difference(RUN[name], made.replace(rough, '"Roughness": 0.5'))
     assert other is not None
