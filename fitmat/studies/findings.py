@@ -20,6 +20,7 @@ from fitmat.judgement.prediction import Section, standardised_residuals
 from fitmat.judgement.predictive_check import PredictiveCheck
 from fitmat.judgement.scope import describe_scope
 from fitmat.judgement.several_facets import left_out
+from fitmat.judgement.yardstick import Yardstick, explained
 from fitmat.studies.curves import Curve, predict_curves
 from fitmat.text import brief
 from fitmat.uncertainty.derived import derived
@@ -55,7 +56,7 @@ class Findings:
         doubts: What speaks against the intervals.
         scope: What the intervals are about, as sentences.
         several_facets: How much light single scattering leaves out, in a sentence.
-        metrics: Name → distance from the measurements.
+        metrics: Name → distance from the measurements; "explained", the share of what can be.
         priors: Parameter → what was believed of it before, as text, one for each channel.
         learnt: What the data added, for each fitted parameter.
         curves: Along each section of the study.
@@ -100,6 +101,7 @@ def find(
     along: Sequence[Section],
     identifiability: Identifiability | None = None,
     check: PredictiveCheck | None = None,
+    possible: Yardstick | None = None,
 ) -> Findings:
     """What a posterior says of its model.
 
@@ -108,6 +110,7 @@ def find(
         along: Sections of the measurements, along which the model is drawn.
         identifiability: What the angles determine, where that was asked; what they leave open is called so everywhere.
         check: Whether the model can make such data, where that was asked.
+        possible: What the readings themselves say, of which a model explains a share.
     """
     fit = posterior.fit
     fitted = posterior.quantities(() if identifiability is None else identifiability.undetermined)
@@ -119,7 +122,7 @@ def find(
         doubts=find_doubts(fit),
         scope=describe_scope(fit),
         several_facets=left_out(fit),
-        metrics=fit_metrics(fit),
+        metrics=fit_metrics(fit) | {"explained": None if possible is None else explained(possible, fit)},
         priors=priors.words(fit.model, fit.data.prior),
         learnt=_learnt(posterior),
         curves=predict_curves(posterior, along),

@@ -21,6 +21,7 @@ from fitmat.judgement.examination.examining import warnings
 from fitmat.judgement.identifiability.verdicts import Identifiability, identify
 from fitmat.judgement.prediction import sections
 from fitmat.judgement.predictive_check import PredictiveCheck, check_predictions
+from fitmat.judgement.yardstick import yardstick
 from fitmat.match.match import Match, compare, is_empirical, is_microfacet
 from fitmat.match.pairing import paired_draws
 from fitmat.measurements.large.stream import Stream
@@ -199,6 +200,7 @@ def judge(
     say = progress or (lambda *_: None)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         odd = pool.submit(_odd, posteriors)
+        possible = pool.submit(yardstick, posteriors[0].fit.measurements)
         say("comparing", 0, 0)
         match = _match(posteriors, full)
         usable = [p for p in posteriors if p.fit.finite and p.fit.loss.posterior]
@@ -215,7 +217,7 @@ def judge(
 
         def looked(posterior: Posterior) -> Findings:
             asked, check = _examined(posterior, seed) if posterior in looked_at else (None, None)
-            return find(posterior, along, asked, check)
+            return find(posterior, along, asked, check, possible.result())
 
         for found in pool.map(looked, posteriors):
             findings.append(found)
