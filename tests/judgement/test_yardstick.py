@@ -1,15 +1,19 @@
 """The yardstick: against a Gaussian process solved with all pairs, and against truths that are known."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import fitmat as fm
+from fitmat.fitting.process import Sizes
+from fitmat.judgement import yardstick as room
 from fitmat.judgement.yardstick import LENGTHS, WIDTHS, explained, yardstick
 
 LIGHT, SENSOR = np.deg2rad([15.0, 40.0, 65.0]), np.deg2rad(np.arange(-75.0, 76.0, 5.0))
 
 
-def scan(name: str = "lambert+ggx", noise: float = 0.03, seed: int = 0, **told: float) -> fm.Measurements:
+def scan(name: str = "lambert+ggx", noise: float = 0.03, seed: int = 0, **told: Any) -> fm.Measurements:
     told = told or {"kd": 0.2, "alpha": 0.25}
     return fm.simulate(
         fm.model(name, **told), LIGHT, SENSOR, relative_noise=noise, absolute_noise=0.03 * noise, seed=seed
@@ -32,13 +36,11 @@ def every_pair(m: fm.Measurements, width: float, white: float, process: float) -
 
 def test_it_is_the_posterior_of_a_gaussian_process(monkeypatch: pytest.MonkeyPatch) -> None:
     m = scan()
-    kept = {}
+    kept: dict[int, Sizes] = {}
 
-    def sized(*given: object) -> object:
+    def sized(*given: Any) -> Sizes:
         kept[len(kept)] = found = genuine(*given)
         return found
-
-    from fitmat.judgement import yardstick as room
 
     genuine = room.sizes
     monkeypatch.setattr(room, "sizes", sized)
