@@ -23,10 +23,10 @@ from fitmat.uncertainty.posterior import Posterior
 REPLICATED_DRAWS = 200
 """Posterior draws behind every p-value, where the file is not large."""
 
-MOST_NUMBERS = 1_000_000
-"""Draws × values; files of more than 5,000 values get fewer draws, but at least `FEWEST_DRAWS`.
+MOST_NUMBERS = 2_000_000
+"""Draws × values; files of more than 10,000 values get fewer draws, but at least `FEWEST_DRAWS`.
 
-So many values leave a posterior so narrow that a p-value hardly depends on the draw."""
+What is averaged over d draws has an error of at most 0.3/√d: 0.02 of 200 draws, 0.07 of the fewest."""
 
 FEWEST_DRAWS = 20
 

@@ -32,6 +32,9 @@ NEAR_MIRROR = np.deg2rad(20.0)
 SURPRISING = 0.05
 """Adjusted p-value below which a check counts as failed: one in twenty files of a right model has any such."""
 
+PEAKS = 200
+"""Highest values of replicated data behind the range that is shown of one: several a draw where draws are fewer."""
+
 TOP = 16
 """Directions of one incidence among which replicated peaks are sought for display."""
 
@@ -108,13 +111,14 @@ class Replicates:
 
     def peaks(self, highest: np.ndarray, s: np.ndarray) -> Iterator[Statistic]:
         """The highest value of each incidence; its expected range is sought among the brightest directions only."""
-        kappa = np.asarray(self.fit.data.kappa)
+        kappa, again = np.asarray(self.fit.data.kappa), -(-PEAKS // len(s))
+        spread = np.repeat(s, again)[:, None, None]
         for group, peak in zip(self.groups, highest, strict=True):
             under = np.exp(self.below[:, group.rows].sum(axis=(1, 2)))
             order = np.argsort(-(self.x[0] / kappa)[group.rows].max(axis=1))
             bright = group.rows[np.resize(order, TOP)]
-            x, noise = self.x[:, bright], self.noise[:, bright]
-            drawn = replicated(x, noise, s[:, None, None], self.rng.standard_normal(x.shape)) / kappa[bright]
+            x, noise = (np.repeat(part[:, bright], again, axis=0) for part in (self.x, self.noise))
+            drawn = replicated(x, noise, spread, self.rng.standard_normal(x.shape)) / kappa[bright]
             ends = np.quantile(np.where(self.used[bright], drawn, -np.inf).max(axis=(1, 2)), [0.025, 0.975])
             yield _statistic("peak", group.name, peak, ends, 1.0 - under, under)
 
