@@ -1,5 +1,6 @@
 """Calibration by simulation: the tests of uniformity against exact sums, and planted faults that must be found."""
 
+import dataclasses
 import itertools
 from typing import Any
 
@@ -111,6 +112,29 @@ def test_too_little_noise_told_is_found_as_too_much_discrepancy() -> None:
     assert wrong.p_values().min() < CLEARLY
     assert np.median(wrong.ranks[wrong.trusted, 1]) < RANKED_DRAWS / 4
     assert wrong.words.startswith("lambert, laplace: NOT calibrated: the posterior is wrong in ")
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("given", [True, False])
+def test_intervals_hold_as_people_fit(given: bool) -> None:
+    """Default priors, σ given or estimated: what is quoted holds 95 truths in 100; small `benchmarks/as_fitted.py`."""
+    rng, angles = np.random.default_rng(4), np.deg2rad(np.arange(-80.0, 81.0, 5.0))
+    at = fm.from_arrays(np.deg2rad(45.0), np.abs(angles), np.ones(33), phi=np.where(angles >= 0, np.pi, 0.0))
+    held = []
+    for _ in range(250):
+        truth = rng.uniform([0.1, 0.1, 10.0], [0.5, 0.5, 50.0])
+        surface = fm.model("lambert+blinn-phong", **dict(zip(("kd", "ks", "exponent"), truth, strict=True)))
+        exact = fm.evaluate(surface, at.wi, at.wo)
+        sigma = np.hypot(0.02 * exact, 1e-3)
+        measured = dataclasses.replace(at, value=exact + sigma * rng.normal(size=exact.shape))
+        told = dataclasses.replace(measured, sigma=sigma if given else None)
+        quoted = fm.laplace(fm.fit(told, surface.name), seed=1).quantities()[:3]
+        held.append([q.ci95[0, 0] <= x <= q.ci95[0, 1] for q, x in zip(quoted, truth, strict=True)])
+    for hits in np.sum(held, axis=0):
+        low, high = coverage_limits(len(held), int(hits))
+        assert stats.binomtest(int(hits), len(held), 0.95).pvalue > CLEARLY
+        assert low < 0.98
+        assert high > 0.92
 
 
 @pytest.mark.study
