@@ -6,7 +6,7 @@ Finds nothing itself; `fitting` does.
 import dataclasses
 import functools
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 
 import numpy as np
 import polars as pl
@@ -184,8 +184,7 @@ class Fit:
             return "adequacy unknown: all values are identical"
         shared = f", but {self.correlation.shared}" if self.correlation.shared else ""
         if ratio < FOLLOWS:
-            whole = " on the whole" if shared else ""
-            return f"follows the data within the measurement noise{whole}{shared}"
+            return f"follows the data within the measurement noise{' on the whole' if shared else ''}{shared}"
         if ratio < MISSES:
             return f"follows the data to about the measurement noise (misfit {ratio:.1f} × noise){shared}"
         return f"inadequate: misses the data by {ratio:.0f} × the measurement noise"
@@ -203,14 +202,16 @@ class Fit:
         """
         return named(self.parameters, name, self.name)
 
+    def __iter__(self) -> Iterator[str]:
+        return (q.name for q in self.parameters)
+
     def to_dataframe(self) -> pl.DataFrame:
         """The parameters as a table, one row for each and each channel."""
         return dataframe(self.parameters, self.name, self.measurements.channels)
 
     def _rows(self) -> list[tuple[str, str, str]]:
-        channels = self.measurements.channels
-        each = ((label, q, k) for q in self.parameters for k, label in enumerate(q.labels(channels)))
-        return [(label, q.symbol, with_error(float(q.value[k]), float(q.sd[k]))) for label, q, k in each]
+        each = ((n, q, k) for q in self.parameters for k, n in enumerate(q.labels(self.measurements.channels)))
+        return [(name, q.symbol, with_error(float(q.value[k]), float(q.sd[k]))) for name, q, k in each]
 
     def __str__(self) -> str:
         """The outcome and every parameter with its standard deviation."""
@@ -221,8 +222,7 @@ class Fit:
 
     @property
     def _caption(self) -> str:
-        starts = f"{self.n_starts_agreeing} of {self.n_starts} starts agree"
-        return f"{self.name}: {self.result}, {starts}; {self.adequacy}."
+        return f"{self.name}: {self.result}, {self.n_starts_agreeing} of {self.n_starts} starts agree; {self.adequacy}."
 
     @property
     def aicc(self) -> float:

@@ -31,7 +31,10 @@ DRAWS = 60
 
 SCRIPTS = (
     ("fitmat.exports", "shader.js"),
-    *(("fitmat.reports", f"static/{name}") for name in ("scene.js", "controls.js", "ball.js", "solids.js", "lobes.js")),
+    *(
+        ("fitmat.reports", f"static/{name}")
+        for name in ("scene.js", "controls.js", "ball.js", "solids.js", "lobes.js", "mounting.js")
+    ),
 )
 """What draws the ball, in the order in which it is read."""
 

@@ -73,6 +73,9 @@ class Fitted:
         """
         return named(self.parameters, name, self.name)
 
+    def __iter__(self) -> Iterator[str]:
+        return (q.name for q in self.parameters)
+
     def to_dataframe(self) -> pl.DataFrame:
         """The parameters as a table, one row for each and each channel."""
         return dataframe(self.parameters, self.name, self.channels)

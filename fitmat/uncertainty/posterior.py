@@ -7,7 +7,7 @@ import dataclasses
 import functools
 import io
 import json
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -195,6 +195,9 @@ class Posterior:
             ModelError: the model has none of that name.
         """
         return named(self.quantities(), name, self.fit.name)
+
+    def __iter__(self) -> Iterator[str]:
+        return (q.name for q in self.quantities())
 
     def to_dataframe(self) -> pl.DataFrame:
         """The parameters as a table, one row for each and each channel; the draws are `table`."""

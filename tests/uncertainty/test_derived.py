@@ -55,6 +55,10 @@ def test_a_parameter_is_asked_for_by_its_name(fit: Fit) -> None:
     assert table.row(2, named=True)["sd"] == float(drawn.sd[0])
     with pytest.raises(ModelError, match=r"lambert\+ggx has no parameter 'alfa', expected one of kd, ks, alpha, eta\."):
         fit["alfa"]
+    assert "alpha" in fit
+    assert "alfa" not in fit
+    assert list(fit) == [q.name for q in fit.parameters]
+    assert list(posterior) == ["kd", "ks", "alpha", "eta", "discrepancy"]
 
 
 def test_parameters_are_listed_with_their_discrepancy(fit: Fit) -> None:

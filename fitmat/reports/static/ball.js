@@ -4,12 +4,6 @@
 const GREY = 0.18; // mean luminance of the lit part when the exposure is found, white being 1
 const ACROSS = 320; // pixels of a picture, times what the display has
 
-// World to viewer, by columns: turned about y, then about x.
-function turned([azimuth, elevation]) {
-    const [c, s, d, e] = [cos(azimuth), sin(azimuth), cos(elevation), sin(elevation)];
-    return [c, e * s, -d * s, 0, d, e, s, -e * c, d * c];
-}
-
 class Ball {
     constructor(root, data) {
         this.root = root;
@@ -299,19 +293,4 @@ class Ball {
         ];
         return made("fieldset", {}, made("legend", {}, "Surface and display"), ...rows.map(({ row }) => row));
     }
-}
-
-// Puts the ball into an element, or says why there is none; returns it, for whoever looks further into it.
-// Stills are pictures by the names of the models, shown where it cannot be drawn.
-function mountBall(root, data, stills = {}) {
-    try {
-        root.ball = new Ball(root, data);
-    } catch (error) {
-        root.replaceChildren(made("p", {}, `The ball cannot be drawn in this browser: ${error.message}.`));
-        for (const { role, name } of data.models.filter((model) => model.name in stills)) {
-            const picture = made("img", { src: stills[name], alt: `Lit ball of ${name}` });
-            root.append(made("figure", { class: "still" }, picture, made("figcaption", {}, role)));
-        }
-    }
-    return root.ball;
 }

@@ -59,3 +59,9 @@ function choice(label, named, changed) {
 
 const sin = (degrees) => Math.sin((degrees * Math.PI) / 180), cos = (degrees) => Math.cos((degrees * Math.PI) / 180);
 const degrees = (x) => `${Math.round(x)}°`;
+
+// World to viewer, by columns: turned about y, then about x.
+function turned([azimuth, elevation]) {
+    const [c, s, d, e] = [cos(azimuth), sin(azimuth), cos(elevation), sin(elevation)];
+    return [c, e * s, -d * s, 0, d, e, s, -e * c, d * c];
+}

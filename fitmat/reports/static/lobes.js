@@ -204,9 +204,3 @@ class Lobes {
         this.read.textContent = `θ_h ${k + 0.5}°, θ_d ${CELLS - row - 0.5}°: ${told} sr⁻¹`;
     }
 }
-
-// Puts the lobes of a ball's materials into an element.
-function mountLobes(root, ball, curves, channels, maps = []) {
-    root.lobes = new Lobes(root, ball, curves, channels, maps);
-    return root.lobes;
-}
