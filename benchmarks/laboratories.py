@@ -4,7 +4,7 @@ x_l = μ + a_l + e_l, e_l of the standard uncertainty u_l that the laboratory st
 between laboratories. The stated u_l are drawn between half and twice their typical value. It is `agreement` alone that
 is asked, the statistics of `fitmat labs`; no surface is fitted. The table goes to laboratories.md.
 
-Run: python benchmarks/laboratories.py [--sets 4000]
+Run: python benchmarks/laboratories.py [--sets 2000]
 """
 
 import argparse
@@ -35,7 +35,7 @@ def rates(count: int, between: float, sets: int) -> tuple[float, float]:
 def main() -> None:
     """Simulate, write."""
     told = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    told.add_argument("--sets", type=int, default=4000, help="of laboratories in each cell")
+    told.add_argument("--sets", type=int, default=2000, help="of laboratories in each cell")
     sets = told.parse_args().sets
     lines = []
     for count in COUNTS:
