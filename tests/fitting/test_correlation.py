@@ -203,7 +203,7 @@ def test_two_halves_of_a_range_agree() -> None:
     """
     halves = np.deg2rad([[10.0, 20.0, 30.0], [45.0, 55.0, 65.0]])
     quoted, alone = [], []
-    for seed in range(16):
+    for seed in range(32):
         pair = [fm.fit(two_lobes(half, OUT, seed), "lambert+ggx") for half in halves]
         apart = np.abs(np.subtract(*(fit.coordinates.natural(fit.values) for fit in pair)))[:3]
         for found, of in ((quoted, "covariance"), (alone, "likelihood_covariance")):
