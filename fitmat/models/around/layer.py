@@ -78,8 +78,9 @@ class Layer(eqx.Module):
     def ways(self) -> Ways:
         """From the passage and exp(−τ/c′)."""
         left = self.left(cosines(self.eta)[1])
-        entered = self.passage.entering[..., None] * left
-        entered = entered / jnp.maximum(jnp.sum(entered, axis=1, keepdims=True), 1e-300)
+        way = jnp.atleast_1d(self.depth) / jnp.maximum(cosines(self.eta)[1], COS_MIN)[:, None]
+        entered = self.passage.entering[..., None] * jnp.exp(jnp.min(way, axis=0) - way)  # else 0/0 in thick coats
+        entered = entered / jnp.maximum(jnp.sum(entered, axis=1, keepdims=True), _TINY)
         back = self.passage.returning
         return Ways(entered, (1.0 - jnp.sum(back, axis=1))[:, None] * left, left[:, None] * back[..., None] * left)
 
