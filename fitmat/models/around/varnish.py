@@ -4,6 +4,7 @@ from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import above
@@ -61,11 +62,12 @@ class Varnish(AbstractBRDF):
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """What the coat mirrors, and what the base sends through it."""
         layer, seen = self.coat.layer(), self.below()
-        light = exchange(self.base, seen, layer)
+        light, visible = exchange(self.base, seen, layer), above(wi, wo)
+        wi, wo = (jnp.where(visible, w, np.array([0.0, 0.0, 1.0])) for w in (wi, wo))
         enter, leave = layer.entering(wi[2]), layer.entering(wo[2])
         body = seen(layer.refracted(wi), layer.refracted(wo)) * light.raised(wi[2]) * light.raised(wo[2])
         through = enter * leave / layer.eta**2 * (body + light.spread(wi[2], wo[2]))
-        return jnp.where(above(wi, wo), self.coat.mirrored(wi, wo) + through, 0.0)
+        return jnp.where(visible, self.coat.mirrored(wi, wo) + through, 0.0)
 
     def below(self) -> AbstractBRDF:
         """The base with its lobes as they look through the face."""
