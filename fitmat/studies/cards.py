@@ -61,6 +61,13 @@ class Card:
     word: str
     sentence: str
 
+    @property
+    def after_word(self) -> str:
+        """The sentence where the word stands above it, without the same word: "Yes: it follows …" is "It follows …"."""
+        first, colon, rest = self.sentence.partition(": ")
+        said = colon and first.lower() == self.word.lower()
+        return rest[:1].upper() + rest[1:] if said else self.sentence
+
 
 def cards(record: Record) -> tuple[Card, Card, Card]:
     """The three cards of a run, in the order in which they are read."""
@@ -143,8 +150,8 @@ def _standing_in(match: Record, one: str, other: str, question: str) -> Card:
     upto = match["serves_up_to_deg"]
     if upto is not None and upto >= SERVES_FROM_DEG:
         beyond = "" if upto <= match["measured_deg"][1] + np.rad2deg(WITHIN) else ", extrapolated"
-        words = f"{one} serves up to {upto:.0f}°{beyond}, within {100 * SIMILAR:.0f} % of {other}"
-        return Card(question, CAUTION, f"up to {upto:.0f}°", f"{words}; {eye or 'beyond, it breaks'}.")
+        words = f"{one} serves up to {upto:.0f}° of incidence{beyond}, within {100 * SIMILAR:.0f} % of {other}"
+        return Card(question, CAUTION, f"up to {upto:.0f}° of incidence", f"{words}; {eye or 'beyond, it breaks'}.")
     shares = {region: e["value"] for region, e in match["distances"]["relative"]["share"].items()}
     worst = max(shares, key=lambda region: shares[region] or 0.0)
     where = f"{100 * (shares[worst] or 0.0):.0f} % of the difference to {other} lies {PLACES[worst]}"
@@ -154,7 +161,7 @@ def _standing_in(match: Record, one: str, other: str, question: str) -> Card:
 PLACES = {
     "core": "in the core of the highlight",
     "tail": "in the tail of the highlight",
-    "grazing": f"beyond {GRAZING_DEG:.0f}°",
+    "grazing": f"at grazing angles, beyond {GRAZING_DEG:.0f}°",
     "diffuse": "far from the highlight",
 }
 """Region of `match.regions` → where that is."""

@@ -113,7 +113,7 @@ def test_page_is_well_formed_and_says_what_was_found(report, studied):
     assert studied.match is not None
     assert studied.match.verdict in read.text.replace("\u00a0", " ")
     for card in cards(record.to_dict(studied)):
-        assert card.sentence in read.text.replace("\u00a0", " ")
+        assert card.after_word in read.text.replace("\u00a0", " ")
     for entry in bibtex(record.to_dict(studied)).split("\n@"):
         assert " ".join(entry.split()).removeprefix("@") in read.text
     for words in (
@@ -215,7 +215,7 @@ def test_outcomes_are_labelled(studied):
     posterior = studied.posteriors[1]
     odd = dataclasses.replace(posterior.fit, result="unidentifiable", undetermined=("eta", "ks"))
     text = Page(html_of(alone(dataclasses.replace(posterior, fit=odd, interrupted=True)))).text
-    assert "lambert+ggx: unidentifiable. At least one parameter is not determined by these angles: fix it" in text
+    assert "lambert+ggx: At least one parameter is not determined by these angles: fix it" in text
     assert "Not determined: ks, eta." in text
     assert "sampling was interrupted; what was done is kept" in text
 

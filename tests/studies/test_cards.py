@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from fitmat.studies.cards import BAD, CAUTION, GOOD, MOST_WORDS, UNKNOWN, cards
+from fitmat.studies.cards import BAD, CAUTION, GOOD, MOST_WORDS, UNKNOWN, Card, cards
 
 
 def quantity(value: Any, sd: Any = 0.001, remark: Any = "") -> dict[str, Any]:
@@ -66,7 +66,8 @@ def test_a_plastic_is_told_in_three_sentences() -> None:
     material, phong, trust = cards(record())
     assert material.sentence == "Like satin plastic: diffuse 20 %, F0 4.0 %, α 0.1500 ± 0.0004 (GGX)."
     assert phong.sentence == (
-        "Blinn–Phong does not serve: ΔE2000 5.3 on average; 97 % of the difference to GGX lies beyond 70°."
+        "Blinn–Phong does not serve: ΔE2000 5.3 on average; "
+        "97 % of the difference to GGX lies at grazing angles, beyond 70°."
     )
     assert trust.sentence == (
         "Yes: GGX follows the data within the noise and every parameter is determined; no further angle is needed."
@@ -132,8 +133,12 @@ def test_a_material_is_called_what_its_numbers_are(parameters: Any, derived: Any
             "hardly differs from GGX.",
         ),
         ({"perceived": None, "measured_distance": {"value": 0.08, "ci95": [0.07, 0.11]}}, BAD, "does not serve: 97 %"),
-        ({"serves_up_to_deg": 60.0}, CAUTION, "serves up to 60°, within 30 % of GGX; ΔE2000 5.3 on average."),
-        ({"serves_up_to_deg": 85.0}, CAUTION, "serves up to 85°, extrapolated, within 30 % of GGX"),
+        (
+            {"serves_up_to_deg": 60.0},
+            CAUTION,
+            "serves up to 60° of incidence, within 30 % of GGX; ΔE2000 5.3 on",
+        ),
+        ({"serves_up_to_deg": 85.0}, CAUTION, "serves up to 85° of incidence, extrapolated, within 30 % of GGX"),
         ({"serves_up_to_deg": 15.0}, BAD, "does not serve"),
         ({"delta_bic": -11.0}, CAUTION, "serves better than GGX, but neither follows the data"),
         ({"delta_bic": None}, BAD, "does not serve"),
@@ -247,3 +252,10 @@ def test_an_objective_has_no_intervals_and_nothing_finite_no_values() -> None:
     material, phong, trust = cards(record(fits=[fitted("lambert+ggx", **nothing)], choice=None, match=None))
     assert [card.level for card in (material, phong, trust)] == [BAD, UNKNOWN, BAD]
     assert "nothing finite" in material.sentence
+
+
+def test_a_word_above_its_sentence_is_not_said_twice() -> None:
+    said = Card("Can I trust it?", GOOD, "yes", "Yes: GGX follows the data within the noise.")
+    assert said.after_word == "GGX follows the data within the noise."
+    other = Card("Phong or not", BAD, "does not serve", "Blinn–Phong does not serve: ΔE2000 5.3 on average.")
+    assert other.after_word == other.sentence
