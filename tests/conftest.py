@@ -1,8 +1,10 @@
 """What every test stands on: float64, compiled programs shared by all workers, reproducible draws, directions."""
 
 import gc
+import importlib
 import os
 import tempfile
+import warnings
 from collections.abc import Callable, Iterator
 from importlib.metadata import version
 from pathlib import Path
@@ -109,6 +111,14 @@ def mitsuba() -> ModuleType:
 
     mitsuba.set_variant("scalar_rgb")
     return mitsuba
+
+
+@pytest.fixture(scope="session")
+def science() -> ModuleType:
+    """colour-science, which sets filters for warnings."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return importlib.import_module("colour")
 
 
 @pytest.fixture(scope="session")

@@ -115,7 +115,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
         {f.name: getattr(MEASURED, f.name) for f in dataclasses.fields(MEASURED)},
         {
             **dict.fromkeys(("wi", "wo", "value", "valid"), (None, "x", 5, [], np.zeros(3), np.zeros((2, 1)), FIT)),
-            "sigma": ("x", 5, [], np.zeros(3), np.zeros((2, 1)), FIT),
+            **dict.fromkeys(("sigma", "horizontal"), ("x", 5, [], np.zeros(3), np.zeros((2, 1)), FIT)),
             "channels": (None, "r", 5, ("r", "g"), FIT),
             "instrument": NOUN,
             "stated": (None, "TIS", 0.3, [], (0.3,), FIT),
@@ -169,6 +169,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             "model": without(NOUN, AbstractBRDF),
             "theta_i": (*without(NUMBERS, NOTHING), np.nan, [], np.zeros((2, 2))),
             "phi_i": (*NUMBERS, np.nan, [0.1, 0.2]),
+            "goal": (*NUMBER, 0.0, 2.0),
         },
     ),
     "Surface": (
@@ -194,6 +195,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
         )
         for name in ("evaluate_walk", "albedo_walk", "evaluate_slab")
     },
+    "fresnel_in_rgb": ({"material": "Au"}, {"material": (*NOUN, *TEXT), "illuminant": (*NOUN, *TEXT)}),
     "transmittance": (
         {"theta_i": 0.5, "eta": 1.5},
         {"theta_i": (*NUMBERS, np.nan, 45.0), "eta": (*NUMBERS, np.nan, 0.0, -1.5)},

@@ -11,9 +11,10 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Complex, Float
 
+from fitmat import arguments
 from fitmat.colour.channels import sensitivities
 from fitmat.colour.differences import JUST_NOTICEABLE, delta_e_2000
-from fitmat.colour.observers import seen, wavelengths, white
+from fitmat.colour.observers import ILLUMINANTS, seen, wavelengths, white
 from fitmat.colour.spaces import FROM_SRGB, linear
 from fitmat.errors import ModelError
 from fitmat.models import spectral
@@ -105,8 +106,8 @@ def fresnel_in_rgb(material: str, illuminant: str = "D65") -> InRgb:
         >>> fm.fresnel_in_rgb("Au").f0.round(2)
         array([1.04, 0.73, 0.36])
     """
-    if not isinstance(material, str):
-        raise ModelError(f"fresnel_in_rgb(material): got {type(material).__name__}, expected a name such as 'Au'.")
+    arguments.kind("material", material, str)
+    arguments.choice("illuminant", illuminant, ILLUMINANTS)
     lit = seen(illuminant)
     nodes, weights = angle_nodes(48)
     cos = np.concatenate([np.cos(np.deg2rad(ANGLES)), [COS_82], nodes])

@@ -5,6 +5,7 @@ Nothing is computed here but the colours of the strip.
 
 from matplotlib.figure import Figure
 
+from fitmat import arguments
 from fitmat.colour.differences import JUST_NOTICEABLE
 from fitmat.colour.observers import white
 from fitmat.colour.spaces import adaptation, to_srgb
@@ -23,7 +24,12 @@ LINES = {
 
 
 def fresnel(found: InRgb) -> Figure:
-    """A strip of the reflected colour over 0 to 89°, clipped as a display does, above ΔE2000 by angle."""
+    """A strip of the reflected colour over 0 to 89°, clipped as a display does, above ΔE2000 by angle.
+
+    Args:
+        found: From `fresnel_in_rgb`.
+    """
+    arguments.kind("found", found, InRgb)
     figure = Figure(figsize=(5.6, 4.2), layout="constrained")
     strip, below = figure.subplots(2, 1, sharex=True, height_ratios=(1, 6))
     own = adaptation(white(found.illuminant), white("D65"))

@@ -58,7 +58,7 @@ def test_the_picture_is_drawn_once(tmp_path: Path, capsys: pytest.CaptureFixture
         ((None, "metals", "A", None), "--table beside a material, --plot or --illuminant"),
         ((None, "woods", "D65", None), "--table woods: expected metals or dielectrics"),
         (("Unobtainium", None, "D65", None), "material 'Unobtainium' is not known"),
-        (("Au", None, "candle", None), "illuminant 'candle' is not known"),
+        (("Au", None, "candle", None), "illuminant is the text 'candle', expected 'D65' or"),
     ],
 )
 def test_what_is_refused(told: tuple[str | None, str | None, str, None], message: str) -> None:

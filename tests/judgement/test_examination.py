@@ -489,14 +489,17 @@ def test_notebooks_get_escaped_lines() -> None:
 
 
 def test_the_chassis_levels_off_far_below_its_peak(shared_data: Path) -> None:
-    """A satellite's chassis over 8 decades: the README of the data names its instrument floor."""
+    """A satellite's chassis over 8 decades: the README of the data names its instrument floor.
+
+    Seven readings are 1e-4; four of them, right after readings 190 to 4,600 times brighter, are masked.
+    """
     path = shared_data / "starlink" / "chassis_brdf.csv"
     m = fm.read(path, columns="theta_i=phi_i,phi_i=theta_i,theta_o=phi_o,phi_o=theta_o")
     found = examine(m)
     assert len(found.levels) == 4
     assert all(0.005 < level.value < 0.02 for level in found.levels)
     assert any("decades below the peak: stray light or the instrument's floor" in w for w in found.warnings)
-    assert found.values[0].clipped == int(np.count_nonzero(m.value[m.valid] == 1e-4)) == 7
+    assert found.values[0].clipped == int(np.count_nonzero(m.value[m.valid] == 1e-4)) == 3
     assert found.values[0].decades == pytest.approx(7.9, abs=0.05)
     assert [round(np.rad2deg(p.theta_i), 1) for p in found.peaks] == [5.0, 41.4, 60.0, 75.0]
     assert all(abs(p.offset) < np.deg2rad(0.5) for p in found.peaks)  # half a step

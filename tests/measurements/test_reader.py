@@ -12,6 +12,7 @@ import polars as pl
 import pytest
 
 from fitmat.errors import ReadError
+from fitmat.measurements.blocked import EQUAL
 from fitmat.measurements.parsing.names import ALIASES, Role, role
 from fitmat.measurements.reader import read
 from fitmat.measurements.samples import Measurements
@@ -593,7 +594,8 @@ def test_starlink_chassis():
     path = shared("starlink/chassis_brdf.csv")
     measured = read(path, columns="theta_i=phi_i,phi_i=theta_i,theta_o=phi_o,phi_o=theta_o")
     assert measured.n_samples == 724
-    assert measured.masked == {"at or below the horizon": 8}
+    # 1e-4 right after 0.46, 0.076 and 0.019 fills what was not read; the other end of each scan falls to it.
+    assert measured.masked == {"at or below the horizon": 8, EQUAL: 4}
     assert measured.in_plane.all()
     assert np.unique(np.rad2deg(measured.theta_i).round(6)).tolist() == [5, 41.4, 60, 75]
     at60 = np.isclose(measured.theta_i, np.deg2rad(60))

@@ -8,6 +8,7 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
+from fitmat.text import brief
 from fitmat.uncertainty.estimate import Estimate, estimate
 
 RIM = 0.005
@@ -47,6 +48,8 @@ class Seen:
     share: Float[np.ndarray, " m"]
     fine: tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]
     half: tuple[Float[np.ndarray, " h"], Float[np.ndarray, " h"]]
+
+    __repr__ = brief
 
 
 def spread(lights: list[Seen]) -> Spread:
