@@ -328,7 +328,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             **dict.fromkeys(("model", "name"), TEXT),
             "theta_i": (5, b"x", [], 1j, FIT, np.nan),
             "step": (*TEXT, 5.0, 0.0),
-            **dict.fromkeys(("strict", "verify", "force"), FLAG),
+            **dict.fromkeys(("bump", "strict", "verify", "force"), FLAG),
         },
     ),
     "render": (
