@@ -29,13 +29,16 @@ class AbstractShaded(eqx.Module):
 
 
 def number(value: Any) -> str:
-    """One number to the precision of a float, with a point or an exponent.
+    """One number to the precision of a float, with a point or an exponent, whatever NumPy is told to print.
 
     Example:
         >>> number(0.1), number(50.0), number(1e-12)
         ('0.1', '50.0', '1e-12')
     """
-    return str(np.float32(value))
+    single = np.float32(value)
+    if single == 0.0 or 1e-4 <= abs(single) < 1e6:
+        return np.format_float_positional(single, unique=True, trim="0")
+    return np.format_float_scientific(single, unique=True, trim="-", exp_digits=2)
 
 
 def scalar(name: str, value: Any) -> str:
