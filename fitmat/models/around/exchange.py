@@ -15,11 +15,13 @@ from jaxtyping import Array, Float
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import COS_MIN, mirror, rotated
 from fitmat.maths.quadrature import cosine_mean, gauss
-from fitmat.models.around.layer import Energy, Layer, Ways
-from fitmat.models.around.nodes import LEAVING, TO_LEAVING, cardinal, cosines, leaving, series
+from fitmat.models.around.layer import Energy, Layer
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.glsl import spectrum, table
 from fitmat.models.lobes.lambert import Lambert
+
+LEAVING, KEPT = 10, 5
+"""Cosines at which energies are known: outer ones, whose light can leave, and inner ones below the critical angle."""
 
 RAYS, STEPS = 8, 8
 """Of the rule over what the base reflects: azimuths about the mirror direction (over half a turn), and distances from
@@ -31,90 +33,94 @@ AZIMUTHS = 4
 TRAPPED = 1e-6
 """Share of the returned light that is dropped at each bounce, so that light which never leaves has a limit."""
 
-SWEEPS = 4
-"""Of the search for the factors of the lobe; each halves the logarithm of what is missing."""
-
-_TINY, _ALMOST, _LEAST = 1e-16, 0.999, -10.0
+_TINY, _ALMOST = 1e-16, 0.999
 
 
 class Exchange(eqx.Module):
     """What the base's light becomes by going back and forth, over outer cosines.
 
     Attributes:
+        base: The base; it counts here for its own mirror image p.
         layer: The coat.
-        added: Of 1 − 1/h², h being what the base's lobe as it is seen is multiplied with; of a `nodes.series`, (k, c).
-        rest: Of e, the fraction of the light at the base that leaves and is not in the lobe so raised; the same.
+        peak: Of s, what one more bounce adds to the base's lobe in the mirror direction, relative; coefficients (k, c).
+        rest: Of e, the fraction of the refracted light that leaves later and is not in the lobe so raised.
     """
 
+    base: AbstractBRDF
     layer: Layer
-    added: Float[Array, "k c"]
+    peak: Float[Array, "k c"]
     rest: Float[Array, "k c"]
 
     def raised(self, outer: Array) -> Energy:
-        """h, at each of the two directions."""
-        return 1.0 / jnp.sqrt(1.0 - jnp.clip(series(self.added, outer), _LEAST, _ALMOST))
+        """1/√(1 − s) · 1/(1 − p R): what the base's lobe is multiplied with, at each of the two directions."""
+        ratio = jnp.clip(_powers(_root(outer), LEAVING) @ self.peak, 0.0, _ALMOST)
+        return _repeated(self.base, self.layer, outer, self.layer.inner(outer)) / jnp.sqrt(1.0 - ratio)
 
     def spread(self, ci: Scalar, co: Scalar) -> Spectrum:
-        """BRDF inside the coat, sr⁻¹, of the rest: η² e(c_i) e(c_o)/(π 2∫ e E c dc).
+        """BRDF inside the coat, sr⁻¹, of the rest: η² e(c_i) e(c_o)/(π 2∫ e T c dc).
 
         Kulla & Conty's form (2017): reciprocal, and its energy is e.
         """
         return self.layer.eta**2 * self._later(ci) * self._later(co) / (jnp.pi * self._whole())
 
     def numbers(self) -> tuple[Array, Array, Spectrum]:
-        """`added`, `rest`, and what `spread` divides by."""
-        return self.added, self.rest, self._whole()
+        """`peak` and `rest` as coefficients of Chebyshev polynomials in 2√c − 1, and what `spread` divides by."""
+        turned = jnp.asarray(_TO_CHEBYSHEV)
+        return turned @ self.peak, turned @ self.rest, self._whole()
 
     def _whole(self) -> Spectrum:
-        return jnp.maximum(cosine_mean(lambda c: self._later(c) * self.layer.entering(c)), _TINY)
+        return jnp.maximum(cosine_mean(lambda c: self._later(c) * self._leaves(c)), _TINY)
 
     def _later(self, outer: Array) -> Energy:
-        return jnp.maximum(series(self.rest, outer), 0.0)
+        return jnp.maximum(_powers(_root(outer), LEAVING) @ self.rest, 0.0)
+
+    def _leaves(self, outer: Scalar) -> Energy:
+        return self.layer.crossing(outer, self.layer.inner(outer))[0]
 
 
-def mirrored(seen: AbstractBRDF, layer: Layer, wi: Vec3) -> Energy:
+def mirrored(base: AbstractBRDF, layer: Layer, wi: Vec3) -> Energy:
     """Fraction of the light from outside that leaves by the mirror image of the base, T² p/(1 − p R)."""
-    image = seen.mirror(layer.refracted(wi))
-    back = layer.reflectance(wi[2]) * layer.left(layer.refracted(wi)[2]) ** 2
-    return layer.entering(wi[2]) ** 2 * image / jnp.maximum(1.0 - image * back, _TINY)
+    below = layer.refracted(wi)
+    leaves, back = layer.crossing(wi[2], below[2])
+    image = base.mirror(below)
+    return leaves**2 * image / jnp.maximum(1.0 - image * back, _TINY)
 
 
-def exchange(base: AbstractBRDF, seen: AbstractBRDF, layer: Layer) -> Exchange:
+def exchange(base: AbstractBRDF, layer: Layer) -> Exchange:
     """Solve for the light that comes back to the base, once for all directions.
 
     g(c′) is the fraction of the light on the base from c′ that leaves in the end, by any number of bounces: the
     adding equation (K. N. Liou, An Introduction to Atmospheric Radiation, 2002, sec. 6.4) for the mean over azimuth,
 
-    g = B (L + A R A g),  L = A (1 − R 1),  A = exp(−τ/c′)
+    g(c′) = ∫ f(c′, ω) (T + R g)(ω·n) c dω,  T = (1 − R₁) exp(−τ/c), R = R₁ exp(−2τ/c)
 
-    with what the base sends between the nodes, B, and what the face does, R, as matrices by product integration: the
-    kernels may be as narrow as a mirror's. For a Lambert base nothing is left: Saunderson's ρ/(π(1 − ρR)). A base that
-    reflects more than it receives exchanges light as if it were scaled down to all.
-
-    Args:
-        base: What is below the coat.
-        seen: The base with its lobes as wide as they are seen through the face; the base itself through a smooth one.
-        layer: The coat.
+    by product integration at `LEAVING` + `KEPT` cosines: the kernel may be as narrow as a mirror's. For a Lambert base
+    s = ρR and nothing is left: Saunderson's ρ/(π(1 − ρR)). A base that reflects more than it receives exchanges light
+    as if it were scaled down to all.
     """
     if isinstance(base, Lambert):
         first = jnp.zeros((LEAVING, 1)).at[0].set(1.0)
         ratio = jnp.atleast_1d(base.kd) * layer.returned()
-        return Exchange(layer, first * ratio, 0.0 * first * ratio)
-    _, inner = cosines(layer.eta)
-    ways = layer.ways()
+        return Exchange(base, layer, first * ratio, 0.0 * first)
+    nodes = jnp.asarray(_ROOTS**2)
+    outer = jnp.concatenate([nodes, jnp.zeros(KEPT)])
+    inner = jnp.concatenate([layer.inner(nodes), layer.critical() * jnp.asarray(_BELOW)])
     sent = jax.vmap(lambda cos: _sent(base, layer, cos))(inner)
-    through = sent if seen is base else jax.vmap(lambda cos: _sent(seen, layer, cos))(inner[:LEAVING])
     image = _mirror(base, inner)
     scale = 1.0 / jnp.maximum(image + jnp.sum(sent.energy, axis=1), 1.0)
-    kernel = jnp.einsum("nqc,nqk->cnk", sent.energy, cardinal(layer.eta, sent.inner))
-    kernel = (kernel + jax.vmap(jnp.diag)(image.T)) * scale.T[..., None]
-    once = jnp.einsum("cnk,kc->nc", kernel, ways.leaves)
-    loop = jnp.eye(len(inner)) - (1.0 - TRAPPED) * jnp.einsum("cnk,kmc->cnm", kernel, ways.back)
-    total = jnp.linalg.solve(loop, once.T[..., None])[..., 0].T
-    once, total = (jnp.einsum("jnc,nc->jc", ways.entered, part) for part in (once, total))
-    through = Sent(*(part[:LEAVING] for part in through))
-    through = through._replace(energy=through.energy * scale[:LEAVING, None])
-    return Exchange(layer, *(jnp.asarray(TO_LEAVING) @ p for p in _shared(seen, layer, ways, through, once, total)))
+    energy, image = sent.energy * scale[:, None], image * scale
+    (leave, back), (leave_here, back_here) = layer.crossing(sent.outer, sent.inner), layer.crossing(outer, inner)
+    once = jnp.sum(energy * leave, axis=1) + image * leave_here
+    returned = jnp.einsum("nqc,nqk->cnk", energy * back, _basis(layer, sent))
+    returned += jax.vmap(jnp.diag)((image * back_here).T)
+    total = jnp.linalg.solve(jnp.eye(len(inner)) - (1.0 - TRAPPED) * returned, once.T[..., None])[..., 0].T
+    second = jnp.sum(sent.energy * back * sent.twice, axis=1) / jnp.maximum(sent.peak, _TINY)
+    most = 1.0 - once / jnp.maximum(total, _TINY)
+    ratio = jnp.asarray(_TO_LEAVING) @ jnp.clip(second, 0.0, jnp.clip(most, 0.0, _ALMOST))[:LEAVING]
+    found = Exchange(base, layer, ratio, 0.0 * ratio)
+    shown = jnp.sum(energy * leave * found.raised(sent.outer), axis=1) * found.raised(outer)
+    rest = total - shown - image * leave_here * _repeated(base, layer, outer, inner)
+    return Exchange(base, layer, ratio, jnp.asarray(_TO_LEAVING) @ rest[:LEAVING])
 
 
 class Sent(NamedTuple):
@@ -162,7 +168,7 @@ def _sent(base: AbstractBRDF, layer: Layer, cos: Scalar) -> Sent:
     out = jnp.sqrt(jnp.maximum(1.0 - out2, COS_MIN**2))
     wi, wo = jnp.stack([sin, 0.0 * sin, cos]), jnp.stack([x, y, out], axis=-1)
     f, twice, peak = _averaged(base, wi, wo)
-    return Sent(leaving(layer.eta, out), out, f * area.ravel()[:, None], twice, peak)
+    return Sent(layer.outer(out2), out, f * area.ravel()[:, None], twice, peak)
 
 
 def _averaged(base: AbstractBRDF, wi: Vec3, wo: Float[Array, "q 3"]) -> tuple[Energy, Energy, Spectrum]:
@@ -188,47 +194,59 @@ def _mirror(base: AbstractBRDF, inner: Array) -> Energy:
     return found.reshape(*inner.shape, -1)
 
 
-def _shared(
-    seen: AbstractBRDF, layer: Layer, ways: Ways, sent: Sent, once: Energy, total: Energy
-) -> tuple[Array, Array]:
-    """What leaves after one bounce and after all, (k, c), shared between lobe and rest: 1 − 1/h² and e at the nodes.
+def _repeated(base: AbstractBRDF, layer: Layer, outer: Array, inner: Array) -> Energy:
+    """1/(1 − p R): what the mirror image of the base itself adds by going back and forth."""
+    return 1.0 / jnp.maximum(1.0 - _mirror(base, inner) * layer.crossing(outer, inner)[1], _TINY)
 
-    s is what one more bounce adds to the lobe in the mirror direction, relative, a bounce off a rough face being as
-    much fainter there as it is wider. h h times the energy of the lobe as it is seen is what leaves once, over 1 − s.
-    """
-    _, inner = cosines(layer.eta)
-    image = _mirror(seen, inner[:LEAVING])
-    repeated = 1.0 / jnp.maximum(1.0 - image * jnp.einsum("nnc->nc", ways.back)[:LEAVING], _TINY)
-    by_image = image * ways.leaves[:LEAVING] * repeated
+
+def _basis(layer: Layer, sent: Sent) -> Array:
+    """Cardinal functions of the nodes: polynomials in √c above the critical angle, in c′ below."""
+    leaving = _powers(_root(sent.outer), LEAVING) @ _TO_LEAVING
+    kept = _powers(jnp.minimum(sent.inner / layer.critical(), 1.0), KEPT) @ _TO_KEPT
     leaves = (sent.outer > 0.0)[..., None]
-    leave = jnp.where(leaves, layer.entering(jnp.where(leaves[..., 0], sent.outer, 1.0)), 0.0)
-    kernel = jnp.einsum("jqc,jqk->cjk", sent.energy * leave, series(jnp.asarray(TO_LEAVING), sent.outer))
-    back = cardinal(layer.eta, sent.inner) @ jnp.sum(ways.back, axis=1)
-    second = jnp.sum(sent.energy * back * sent.twice, axis=1) / jnp.maximum(sent.peak, _TINY)
-    wide = seen.width() ** 2
-    second = jnp.clip(second * wide / (wide + layer.slope**2), 0.0, _ALMOST)
-    wanted = (once - image * ways.leaves[:LEAVING]) * repeated**2 / (1.0 - second)
-    wanted = jnp.clip(wanted, 0.0, jnp.maximum(total - by_image, 0.0))
-    factor = repeated / jnp.sqrt(1.0 - second)
-
-    def lobe(factor: Array) -> Energy:
-        return jnp.maximum(jnp.einsum("cjk,kc->jc", kernel, factor), 0.0)
-
-    for _ in range(SWEEPS):
-        factor = jnp.sqrt(factor * (wanted + _TINY) / (lobe(factor) + _TINY))
-    return 1.0 - 1.0 / factor**2, total - by_image - factor * lobe(factor)
+    return jnp.concatenate([jnp.where(leaves, leaving, 0.0), jnp.where(leaves, 0.0, kept)], axis=-1)
 
 
-def light_glsl(added: Array, rest: Array, whole: Spectrum) -> str:
+def _root(outer: Array) -> Array:
+    """√c, with a slope at 0."""
+    return jnp.sqrt(jnp.maximum(outer, 1e-8))
+
+
+def _powers(x: Array, count: int) -> Array:
+    """1, x, …, x^(count−1), last axis."""
+    return x[..., None] ** jnp.arange(count)
+
+
+def _points(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Chebyshev points on [0, 1], and the matrix from values at them to the coefficients of powers."""
+    x = (np.polynomial.chebyshev.chebpts1(count) + 1.0) / 2.0
+    return x, np.linalg.inv(np.vander(x, increasing=True))
+
+
+_ROOTS, _TO_LEAVING = _points(LEAVING)
+_BELOW, _TO_KEPT = _points(KEPT)
+
+_TO_CHEBYSHEV = np.stack(
+    [
+        np.polynomial.chebyshev.poly2cheb(np.polynomial.polynomial.polypow([0.5, 0.5], k)).tolist()
+        + [0.0] * (LEAVING - 1 - k)
+        for k in range(LEAVING)
+    ],
+    axis=1,
+)
+# From coefficients of powers of √c to those of Chebyshev polynomials in 2√c − 1.
+
+
+def light_glsl(peak: Array, rest: Array, whole: Spectrum) -> str:
     """`raised` and `later` of an `Exchange` in GLSL, from its `numbers`."""
     return (
-        table("added", added)
+        table("peak", peak)
         + table("rest", rest)
         + spectrum("whole", whole)
         + """
 // h(c): by how much the base's lobe is raised.
 vec3 raised(float c) {
-    return inversesqrt(1.0 - clamp(coat_series(added, c), -10.0, 0.999));
+    return inversesqrt(1.0 - clamp(coat_series(peak, c), 0.0, 0.999));
 }
 
 // e(c): what leaves later, spread over all directions.

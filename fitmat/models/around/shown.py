@@ -3,8 +3,7 @@
 It changes no value itself.
 """
 
-import dataclasses
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import equinox as eqx
 
@@ -38,10 +37,6 @@ class AbstractShown(AbstractBRDF):
     def isotropic(self) -> bool:
         """Where the base is, and level."""
         return self.level and self.base.isotropic
-
-    def widened(self, slope: Scalar) -> Self:
-        """With the base widened."""
-        return dataclasses.replace(self, base=self.base.widened(slope))  # pyright: ignore[reportCallIssue]
 
     def mirror(self, wi: Vec3) -> Spectrum:
         """That of the base."""
