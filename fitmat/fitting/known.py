@@ -10,7 +10,7 @@ import numpy as np
 from fitmat.errors import ModelError, ReadAs
 from fitmat.measurements.samples import IN_PLANE, Measurements
 from fitmat.models import spectral
-from fitmat.models.in_rgb import RGB, WAYS, fresnel_in_rgb
+from fitmat.models.in_rgb import WAYS, fresnel_in_rgb
 from fitmat.models.parameters import entries
 from fitmat.models.registry import LOBES, OVER, lobe_names, model
 from fitmat.models.terms.fresnel import COS_82, Dielectric
@@ -64,7 +64,7 @@ def of_material(name: str, material: str, channels: tuple[str, ...]) -> Known:
         for key in own:
             entry = names.get(f"{part}.{key}") or names[key]
             known[entry.name] = values[key] if entry.size == len(channels) else np.mean(values[key], keepdims=True)
-    if set(channels) == set(RGB):
+    if set(channels) == set(spectral.RGB):
         _say_what_rgb_cannot_hold(material, {key.rpartition(".")[2] for key in known})
     return {name: known}
 

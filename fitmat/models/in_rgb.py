@@ -19,11 +19,11 @@ from fitmat.colour.spaces import FROM_SRGB, linear
 from fitmat.errors import ModelError
 from fitmat.models import spectral
 from fitmat.models.refractive_index import alternatives, channel_wavelengths
+from fitmat.models.spectral import RGB
 from fitmat.models.terms import belcour
 from fitmat.models.terms.fresnel import COS_82, angle_nodes, conductor, hoffman, schlick
 from fitmat.text import brief
 
-RGB = ("r", "g", "b")
 ANGLES = np.arange(0.0, 90.0)
 """Degrees of incidence at which colours are compared."""
 

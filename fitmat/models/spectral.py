@@ -18,7 +18,7 @@ from fitmat.models.terms.fresnel import angle_nodes, conductor, eta_from_f0
 HELD = 0.25
 """Share of a channel's response that may lie beyond the dataset: plastics are measured from 437 nm, of blue 24 %."""
 
-PRIMARIES = ("r", "g", "b")
+RGB = ("r", "g", "b")
 """Channels that respond to a band of light, and not to a line."""
 
 ABSORBING = 0.01
@@ -44,7 +44,7 @@ def indices(material: str) -> Complex[np.ndarray, " n"]:
     if beyond.max() > HELD:
         raise ModelError(
             f"material {material!r} is known from {low:g} to {high:g} nm, and {100 * beyond.max():.0f} % of what "
-            f"channel {PRIMARIES[beyond.argmax()]} responds to lies beyond; name another dataset as shelf/book/page."
+            f"channel {RGB[beyond.argmax()]} responds to lies beyond; name another dataset as shelf/book/page."
         )
     return index(material, np.clip(nm, low, high))
 
@@ -82,6 +82,7 @@ def seen_by(channels: tuple[str, ...], material: str, cos: Float[np.ndarray, " a
     return np.stack(columns, axis=1)
 
 
+@functools.lru_cache(maxsize=64)
 def channel_indices(material: str, channels: tuple[str, ...]) -> Complex[np.ndarray, " c"]:
     """One η + iκ a channel, whose exact curve is what the channel sees of the material, as closely as one can be.
 
@@ -98,7 +99,9 @@ def channel_indices(material: str, channels: tuple[str, ...]) -> Complex[np.ndar
     """
     cos, lines = angle_nodes(24)[0], channel_wavelengths(channels)
     curves = seen_by(channels, material, np.append(cos, 1.0))
-    return np.array([_nearest(material, *given, cos) for given in zip(channels, lines, curves.T, strict=True)])
+    found = np.array([_nearest(material, *given, cos) for given in zip(channels, lines, curves.T, strict=True)])
+    found.flags.writeable = False  # the next who asks gets the same
+    return found
 
 
 def _nearest(material: str, channel: str, line: float, curve: Float[np.ndarray, " b"], cos: np.ndarray) -> complex:
@@ -128,7 +131,7 @@ def _closest(cos: Float[np.ndarray, " a"], curve: Float[np.ndarray, " a"], start
 def _band(channel: str) -> int | None:
     """Which primary a channel is; None for a line."""
     name = channel.strip().lower()
-    return PRIMARIES.index(name) if name in PRIMARIES else None
+    return RGB.index(name) if name in RGB else None
 
 
 def absorbs(material: str) -> bool:

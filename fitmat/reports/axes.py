@@ -16,6 +16,13 @@ BLACK, ORANGE, BLUE, GREEN, PURPLE = "#000000", "#D55E00", "#0072B2", "#009E73",
 FIT_COLOURS = (ORANGE, BLUE, GREEN, PURPLE)
 
 
+MM = 25.4
+"""In an inch."""
+
+WIDTH_MM, NARROW_MM = 178.0, 120.0
+"""Of a figure over both columns of a page; below the second, panels stand one below the other."""
+
+
 def plain(text: str) -> str:
     """A text in which Matplotlib finds no formula and no letter without a shape, for names that users choose."""
     return visible(text).replace("$", r"\$")
@@ -35,3 +42,14 @@ def check_channel(channel: object, names: Sequence[str]) -> None:
 def new_axes(width: float = 5.0, height: float = 3.6) -> Axes:
     """An empty figure's only axes, without pyplot's global state."""
     return Figure(figsize=(width, height), layout="constrained").add_subplot()
+
+
+def new_figure(width_mm: float, shape: float) -> Figure:
+    """An empty figure so many millimetres wide, its height that times `shape`, and room for a legend.
+
+    Raises:
+        FitmatError: the width is not from 40 to 500.
+    """
+    arguments.numbers("width_mm", width_mm, 40.0, 500.0, single=True)
+    width = width_mm / MM
+    return Figure(figsize=(width, shape * width + 0.4), layout="constrained")

@@ -10,17 +10,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fitmat import arguments
-from fitmat.reports.axes import BLACK, FIT_COLOURS, plain
+from fitmat.reports.axes import BLACK, FIT_COLOURS, NARROW_MM, WIDTH_MM, new_figure, plain
 from fitmat.reports.drawn import channel_of, coverage_of, drawn_of, sections, slices_of
 from fitmat.studies.result import Result
 from fitmat.studies.study import Study
-
-MM = 25.4
-"""In an inch."""
-
-WIDTH_MM, NARROW_MM = 178.0, 120.0
-"""Of a figure over both columns of a page; below the second, panels stand one below the other."""
 
 RATIO = 4.0
 """Measured over fitted from which on a point has the last colour."""
@@ -37,19 +30,13 @@ def lobes(what: Study | Result, *, channel: str | int = 0, width_mm: float = WID
     found = drawn_of(what)
     k, along = channel_of(found, channel), sections(found)
     columns = 1 if width_mm < NARROW_MM or len(along) == 1 else 2
-    figure = _figure(width_mm, -(-len(along) // columns) * 0.62 / columns)
+    figure = new_figure(width_mm, -(-len(along) // columns) * 0.62 / columns)
     for number, section in enumerate(along):
         ax: Any = figure.add_subplot(-(-len(along) // columns), columns, number + 1, projection="polar")
         _lobe(ax, section, k)
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=1 if columns == 1 else len(labels), frameon=False)
     return figure
-
-
-def _figure(width_mm: float, shape: float) -> Figure:
-    arguments.numbers("width_mm", width_mm, 40.0, 500.0, single=True)
-    width = width_mm / MM
-    return Figure(figsize=(width, shape * width + 0.4), layout="constrained")
 
 
 def _lobe(ax: Any, section: Mapping[str, Any], k: int) -> None:
@@ -82,7 +69,7 @@ def slices(what: Study | Result, *, channel: str | int = 0, width_mm: float = WI
     low, high = np.quantile(values, [0.005, 0.995]) if values.size else (-1.0, 1.0)
     columns = 1 if width_mm < NARROW_MM else min(len(found), 2)
     lines = -(-len(found) // columns)
-    figure = _figure(width_mm, lines * 0.8 / columns)
+    figure = new_figure(width_mm, lines * 0.8 / columns)
     panels: list[Axes] = [figure.add_subplot(lines, columns, k + 1) for k in range(len(found))]
     drawn = []
     for one, ax in zip(found, panels, strict=True):
@@ -109,7 +96,7 @@ def coverage(what: Study | Result, *, width_mm: float = WIDTH_MM) -> Figure:
         width_mm: Of the figure.
     """
     found = coverage_of(what)
-    figure = _figure(width_mm, 0.8)
+    figure = new_figure(width_mm, 0.8)
     ax = figure.add_subplot()
     points = ax.scatter(found["theta_h"], found["theta_d"], c=found["theta_i"], s=5, cmap="cividis", vmin=0, vmax=90)
     ax.plot([0, 90], [90, 0], color="0.5", lw=0.8, ls="--")

@@ -14,7 +14,7 @@ from fitmat import arguments
 from fitmat.errors import FitmatError
 from fitmat.match.appearance.spheres import Perceived
 from fitmat.match.discernibility import SEPARATED, Telling
-from fitmat.reports.axes import BLACK, BLUE, FIT_COLOURS, ORANGE, plain
+from fitmat.reports.axes import BLACK, BLUE, FIT_COLOURS, MM, NARROW_MM, ORANGE, WIDTH_MM, new_figure, plain
 from fitmat.reports.axes import new_axes as new_axes
 from fitmat.reports.colour_plot import fresnel as fresnel
 from fitmat.reports.design_plot import design as design
@@ -32,14 +32,8 @@ MOST_DRAWN = 10.0
 DECADES = 1.5
 """A curve that spans more decades than this is drawn on a logarithmic axis."""
 
-MM = 25.4
-"""In an inch."""
-
 LABELS_MM = 18.0
 """What the labels of a corner take, left and below."""
-
-WIDTH_MM, NARROW_MM = 178.0, 120.0
-"""Of a figure over both columns of a page; below the second, panels stand one below the other."""
 
 
 def curves(what: Study | Result, *, channel: str | int = 0, width_mm: float = WIDTH_MM) -> Figure:
@@ -64,10 +58,9 @@ def curves(what: Study | Result, *, channel: str | int = 0, width_mm: float = WI
 
 def _grid(count: int, width_mm: float, shape: float) -> tuple[Figure, list[Axes]]:
     """As many panels as wanted, one beside the other as far as they fit, of this height to width."""
-    arguments.numbers("width_mm", width_mm, 40.0, 500.0, single=True)
     columns = 1 if width_mm < NARROW_MM or count == 1 else 2 if count in (2, 4) else min(3, count)
-    lines, width = -(-count // columns), width_mm / MM
-    figure = Figure(figsize=(width, lines * shape * width / columns + 0.4), layout="constrained")
+    lines = -(-count // columns)
+    figure = new_figure(width_mm, lines * shape / columns)
     return figure, [figure.add_subplot(lines, columns, k + 1) for k in range(count)]
 
 
