@@ -37,6 +37,9 @@ class Table:
         quantity: Name of the column of values.
         lost: Rows whose value stands for nothing.
         delimiter: Between cells.
+        wavelengths: Of the channels in nm, as text; empty where there is one channel without.
+        above: What stands above the header.
+        panel: The reflectance factor of the white panel, as its owner says; None where there is none.
     """
 
     angles: dict[str, np.ndarray]
@@ -45,11 +48,14 @@ class Table:
     quantity: str
     lost: np.ndarray
     delimiter: str = ","
+    wavelengths: tuple[str, ...] = ()
+    above: str = ""
+    panel: float | None = None
 
     def text(self) -> str:
         """The file."""
         rows = zip(*self.written.values(), strict=True)
-        return "\n".join(self.delimiter.join(row) for row in [tuple(self.written), *rows]) + "\n"
+        return self.above + "\n".join(self.delimiter.join(row) for row in [tuple(self.written), *rows]) + "\n"
 
 
 def made(rng: np.random.Generator) -> Table:
@@ -103,6 +109,21 @@ def everything_in_radians(t: Table, rng: np.random.Generator) -> None:
 def radians_in_the_header(t: Table, rng: np.random.Generator) -> None:
     name = str(rng.choice(list(t.angles)))
     _angle(t, name, np.deg2rad(t.angles[name]), f"{name} [rad]")
+
+
+def gon_in_the_header(t: Table, rng: np.random.Generator) -> None:
+    name = str(rng.choice(list(t.angles)))
+    _angle(t, name, t.angles[name] / 0.9, f"{name} [gon]")
+
+
+def negative_zenith(t: Table, rng: np.random.Generator) -> None:
+    """Beside an azimuth: the same direction as the positive one, half a turn on."""
+    turned = rng.random(t.value.shape) < 0.5
+    if "phi" in t.angles:
+        _angle(t, "theta_o", np.where(turned, -1.0, 1.0) * t.angles["theta_o"])
+        _angle(t, "phi", (t.angles["phi"] + 180.0 * turned) % 360.0)
+    else:
+        light_on_the_negative_side(t, rng)
 
 
 def a_whole_turn(t: Table, rng: np.random.Generator) -> None:
@@ -179,14 +200,31 @@ def percent(t: Table, rng: np.random.Generator) -> None:
 
 def thousands(t: Table, rng: np.random.Generator) -> None:
     """Counts of the sample beside those of a white panel, with commas between thousands."""
-    reference = np.full(t.value.shape, 50_000.0)
+    t.delimiter = str(rng.choice([",", ";", "\t"]))
+    _counts(t, '"{:,.0f}"' if t.delimiter == "," else "{:,.0f}", 50_000.0)
+
+
+def thousands_with_points(t: Table, rng: np.random.Generator) -> None:
+    """As where the comma is the decimal mark; where every count has a point, nobody can tell; some have none."""
+    t.delimiter = str(rng.choice([",", ";", "\t"]))
+    _counts(t, "{:,.0f}", min(50_000.0, 999.0 / (np.pi * t.value.min())))
+    t.written = {key: [cell.replace(",", ".") for cell in cells] for key, cells in t.written.items()}
+
+
+def _counts(t: Table, written: str, white: float) -> None:
+    reference = np.full(t.value.shape, np.floor(white))
     counts = np.round(np.pi * t.value * reference)
-    t.value = counts / reference / np.pi
+    t.value, t.panel = counts / reference / np.pi, 1.0
     del t.written[t.quantity]
-    mark = str(rng.choice([",", ";", "\t"]))
-    show = [f'"{x:,.0f}"' if mark == "," else f"{x:,.0f}" for x in counts]
-    t.written |= {"signal": show, "reference": [f'"{x:,.0f}"' if mark == "," else f"{x:,.0f}" for x in reference]}
-    t.delimiter = mark
+    t.written |= {
+        name: [written.format(x) for x in part] for name, part in (("signal", counts), ("reference", reference))
+    }
+
+
+def separator_line(t: Table, rng: np.random.Generator) -> None:
+    """As a spreadsheet is told by."""
+    t.delimiter = str(rng.choice([",", ";", "|", "\t"]))
+    t.above = f"sep={t.delimiter}\n"
 
 
 def decimal_commas(t: Table, rng: np.random.Generator) -> None:
@@ -263,35 +301,62 @@ def arm_from_the_horizon(t: Table, rng: np.random.Generator) -> None:
 
 def wavelength_in_micrometres(t: Table, rng: np.random.Generator) -> None:
     """With the unit, or without it."""
-    name = str(rng.choice(["wavelength", "wavelength [µm]", "lambda"]))
-    t.written[name] = [f"{rng.uniform(0.35, 2.5):.3f}"] * len(t.value)
+    name, length = str(rng.choice(["wavelength", "wavelength [µm]", "lambda"])), int(rng.integers(350, 2500))
+    t.written[name] = [f"{1e-3 * length:.3f}"] * len(t.value)
+    t.wavelengths = (str(length),)
+
+
+def wavelength_in_nanometres(t: Table, rng: np.random.Generator) -> None:
+    length = int(rng.integers(350, 2500))
+    t.written[str(rng.choice(["wavelength", "wavelength [nm]", "lambda"]))] = [str(length)] * len(t.value)
+    t.wavelengths = (str(length),)
+
+
+def wavelengths_in_two_units(t: Table, rng: np.random.Generator) -> None:
+    """Every geometry at two of them, one in nm and one in µm."""
+    shorter, longer = int(rng.integers(350, 900)), int(rng.integers(950, 2500))
+    pair, n = [str(shorter), f"{1e-3 * longer:.3f}"], len(t.value)
+    rng.shuffle(pair)
+    t.written = {key: [*cells, *cells] for key, cells in t.written.items()}
+    name = str(rng.choice(["wavelength", "wavelength [µm]", "wavelength [nm]", "lambda", "channel"]))
+    t.written[name] = [pair[0]] * n + [pair[1]] * n
+    t.wavelengths = str(shorter), str(longer)
 
 
 KINDS: tuple[Callable[[Table, np.random.Generator], None], ...] = (
-    *(azimuth_in_radians, everything_in_radians, radians_in_the_header, a_whole_turn, elevation_by_name),
-    *(
-        elevation_of_the_sensor,
-        elevations_of_both,
-        light_on_the_negative_side,
-        mirrored_azimuth,
-        turned_azimuth,
-        satellite_names,
-        decibels,
-        logarithms,
-    ),
-    *(
-        percent,
-        thousands,
-        decimal_commas,
-        sentinels,
-        blocked_readings,
-        words_for_nothing,
-        typographic_signs,
-        fortran,
-        units_below,
-        quoted,
-    ),
-    *(two_samples, angle_from_the_mirror, arm_from_the_horizon, wavelength_in_micrometres),
+    azimuth_in_radians,
+    everything_in_radians,
+    radians_in_the_header,
+    gon_in_the_header,
+    negative_zenith,
+    a_whole_turn,
+    elevation_by_name,
+    elevation_of_the_sensor,
+    elevations_of_both,
+    light_on_the_negative_side,
+    mirrored_azimuth,
+    turned_azimuth,
+    satellite_names,
+    decibels,
+    logarithms,
+    percent,
+    thousands,
+    thousands_with_points,
+    separator_line,
+    decimal_commas,
+    sentinels,
+    blocked_readings,
+    words_for_nothing,
+    typographic_signs,
+    fortran,
+    units_below,
+    quoted,
+    two_samples,
+    angle_from_the_mirror,
+    arm_from_the_horizon,
+    wavelength_in_micrometres,
+    wavelength_in_nanometres,
+    wavelengths_in_two_units,
 )
 
 
@@ -300,7 +365,7 @@ def outcome(table: Table, folder: Path) -> str:
     path = folder / "table.csv"
     path.write_text(table.text(), encoding="utf-8")
     try:
-        found = fm.read(path)
+        found = fm.read(path, panel=table.panel)
     except FitmatError:
         return "refused"
     if _is_right(table, found):
@@ -310,6 +375,8 @@ def outcome(table: Table, folder: Path) -> str:
 
 def _is_right(table: Table, found: fm.Measurements) -> bool:
     meant = fm.read({**table.angles, "brdf": table.value}, forward=None if "phi" in table.angles else "positive")
+    if table.wavelengths and found.channels != table.wavelengths:
+        return False
     if found.n_samples != meant.n_samples or not np.array_equal(found.valid[:, 0], ~table.lost):
         return False
     kept = ~table.lost

@@ -184,3 +184,13 @@ def test_parts_of_a_column_must_agree_on_what_they_hold(tmp_path):
     path = written(tmp_path, RUNS)
     with pytest.raises(ReadError, match=r"numbers and, from row 4 on, text in the column batch, expected one of both"):
         chunks.scan(path, where="batch=7", rows=2)
+
+
+def test_points_that_may_separate_thousands_are_said(tmp_path):
+    """1.234 beside 987, where German counts are meant; a number with other decimals settles it."""
+    text = "theta_i;theta_o;signal;reference\n20;-10;1.234;10.000\n20;10;2.345;10.000\n20;20;987;10.000\n"
+    said = "signal has 1.234 beside 987: the point was read as a decimal mark. If it separates thousands, write"
+    assert [words for words in read(written(tmp_path, text), panel=1.0).warnings if said in words]
+    for other in ("987.5", "0.987", "987.000", "1.23e2"):
+        found = read(written(tmp_path, text.replace(";987;", f";{other};")), panel=1.0)
+        assert not [words for words in found.warnings if "separates thousands" in words], other

@@ -22,6 +22,7 @@ MISSING = ("", "nan", "na", "n/a", "n.a.", "<na>", "null", "none", "-", "--", "-
 
 _TRUTH = {"true": "1", "t": "1", "yes": "1", "y": "1", "false": "0", "f": "0", "no": "0", "n": "0"}
 _FORTRAN = r"^([-+]?\d*\.?\d*)d([-+]?\d+)$"
+_THREE_BEHIND, _WHOLE = r"^[-+−]?[1-9]\d{0,2}\.\d{3}$", r"^[-+−]?(0|[1-9]\d{0,2})$"
 _PLAIN = {"−": "-", ",": "."}
 
 
@@ -120,6 +121,19 @@ class Table:
         for row in np.flatnonzero(bad)[:1]:
             cell = shown(str(self.cells.to_series(column)[int(row)])) or "(empty)"
             raise ReadError(f"{self.where(row)}: {self.label(column)} = {cell}, expected {expected}")
+
+    def grouped(self, column: int) -> tuple[str, str] | None:
+        """Two cells of a column whose points may separate thousands, None where they cannot.
+
+        As 1.234 beside 987: numbers with three digits behind a point and whole ones below 1000, and no others.
+        """
+        if (cells := self.cells.to_series(column)).dtype != pl.String:
+            return None
+        text = cells.fill_null("").str.strip_chars()
+        pointed, whole = text.str.contains(_THREE_BEHIND), text.str.contains(_WHOLE)
+        if not (pointed.any() and whole.any()) or (text.str.contains(r"\d") & ~pointed & ~whole).any():
+            return None
+        return text.filter(pointed)[0], text.filter(whole)[0]
 
     def _lower(self, column: int) -> pl.Series:
         return self.cells.to_series(column).cast(pl.String).fill_null("").str.strip_chars().str.to_lowercase()

@@ -16,7 +16,7 @@ from fitmat.measurements.parsing.columns import Columns, assign
 from fitmat.measurements.parsing.constants import with_constants
 from fitmat.measurements.parsing.recording import Recording, pivot, sentinels
 from fitmat.measurements.parsing.table import Table
-from fitmat.measurements.parsing.wavelengths import SHORTEST, refuse_unlike
+from fitmat.measurements.parsing.wavelengths import in_nanometres, refuse_unlike
 from fitmat.measurements.samples import default_channels
 
 HIDDEN = 0.3
@@ -90,7 +90,7 @@ def _doubts(
     value: np.ndarray,
     sigma: np.ndarray | None,
 ) -> Iterator[str]:
-    """What may have been meant otherwise: zenith angles that lie beyond 90°, and columns that play no part."""
+    """What may have been meant otherwise: zenith angles beyond 90°, points in numbers, columns that play no part."""
     for name, w in zip(("theta_i", "theta_o"), pair, strict=True):
         beyond = int(np.count_nonzero(w[:, 2] < -ROUNDING))
         if beyond > HIDDEN * len(w):
@@ -99,6 +99,13 @@ def _doubts(
                 "that counts from elsewhere than the normal? Count it from the normal, in the file."
             )
     channel = [] if labels is None else [np.unique(labels, return_inverse=True)[1].reshape(-1, 1)]
+    for column in (*layout.values.values(), *layout.references.values()):
+        if cells := table.grouped(column):
+            one, other = cells
+            yield (
+                f"{table.label(column)} has {one} beside {other}: the point was read as a decimal mark. "
+                "If it separates thousands, write the numbers without it."
+            )
     told, readings = np.hstack([*pair, *channel]), layout.quantity == "signal"
     yield from unused.doubts(table, layout.unused, told, value, noisy=sigma is not None, readings=readings)
 
@@ -175,14 +182,11 @@ def _flagged(table: Table, marks: Mapping[str, int]) -> np.ndarray:
 def _labels(table: Table, marks: Mapping[str, int]) -> np.ndarray | None:
     """Channel of each row, (n,), as wavelength or as text; None where columns are channels."""
     if "wavelength" in marks:
-        labels = table.numbers(marks["wavelength"])
-        if units.split(table.names[marks["wavelength"]])[1] == "µm":
-            labels = np.round(1000 * labels, 6)
-        wrong, expected = ~(np.isfinite(labels) & (labels > 0)), "a wavelength in nm"
-        if (small := (labels > 0) & (labels < SHORTEST)).all():
-            wrong, expected = small, f"{SHORTEST:g} nm and more; if it is in µm, name the column wavelength [µm]"
+        unit = units.split(table.names[marks["wavelength"]])[1]
+        labels, wrong, expected = in_nanometres(table.numbers(marks["wavelength"]), unit)
     elif "channel" in marks:
         labels = table.words(marks["channel"])
+        refuse_unlike(table.source, tuple(dict.fromkeys(labels.tolist())))
         wrong, expected = labels == "", "the name of a channel"
     else:
         return None

@@ -6,6 +6,9 @@ It does not know what is measured at them.
 import re
 from collections.abc import Sequence
 
+import numpy as np
+from jaxtyping import Bool, Float
+
 from fitmat.errors import ReadError
 from fitmat.measurements.parsing import units
 
@@ -27,6 +30,26 @@ def wavelength(name: str) -> str:
     """
     found = _NAME.fullmatch(name.strip()) if len(name) <= units.LONGEST else None
     return found[1] if found and RANGE[0] <= float(found[1]) <= RANGE[1] else ""
+
+
+def in_nanometres(
+    given: Float[np.ndarray, " n"], unit: str
+) -> tuple[Float[np.ndarray, " n"], Bool[np.ndarray, " n"], str]:
+    """The wavelengths of a column in nm, which of its cells cannot be meant so, and what is expected of them.
+
+    Args:
+        given: As the column has them.
+        unit: What its name says: "µm", or "" for nm.
+    """
+    micrometres = unit == "µm"
+    small, lengths = given < SHORTEST, np.round(1000 * given, 6) if micrometres else given
+    if (wrong := ~(np.isfinite(given) & (given > 0))).any():
+        return lengths, wrong, "a wavelength in nm"
+    if (wrong := small != micrometres).any() and not wrong.all():
+        return lengths, wrong, "all wavelengths of the column in one unit, nm or µm"
+    if micrometres:
+        return lengths, wrong, f"less than {SHORTEST:g} µm; if it is in nm, name the column wavelength [nm]"
+    return lengths, wrong, f"{SHORTEST:g} nm and more; if it is in µm, name the column wavelength [µm]"
 
 
 def refuse_unlike(source: str, channels: Sequence[str]) -> None:
