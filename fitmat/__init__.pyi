@@ -28,6 +28,8 @@ from .models.multiple_scattering.position_free import evaluate_slab as evaluate_
 # Fitting
 from .fitting.fitting import fit as fit
 from .fitting.result import Fit as Fit
+from .fitting.many.fitting_many import fit_many as fit_many
+from .fitting.many.fits import Fits as Fits
 
 # Uncertainty
 from .uncertainty.laplace import laplace as laplace

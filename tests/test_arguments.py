@@ -228,6 +228,21 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             "max_steps": (0, *WHOLE),
         },
     ),
+    "fit_many": (
+        {"wi": UP, "wo": UP, "value": np.ones((2, 1))},
+        {
+            **dict.fromkeys(("wi", "wo"), (*NUMBERS, 0.5, [0.5], [[1.0, 1.0, 1.0]])),
+            "value": (*NUMBERS, 0.5, [0.5], np.zeros((2, 3))),
+            "to": (None, "lambort", 5, [], MEASURED),
+            "sigma": (*without(NUMBERS, NOTHING), [1.0, 1.0]),
+            "fixed": KNOWN["fixed"],
+            "loss": (None, *TEXT, "lost", "gaussian", "gaussian-inferred"),
+            "masking": (*TEXT, "mask"),
+            **dict.fromkeys(("starts", "max_steps"), (0, *WHOLE)),
+            "threads": without((0, *WHOLE), NOTHING),
+            "progress": CALLED,
+        },
+    ),
     "laplace": ({"fit": FIT, "seed": 1}, {"fit": without(NOUN, fm.Fit), "seed": WHOLE, "corrected": FLAG}),
     "sample": (
         {"fit": FIT, "seed": 1},
@@ -360,7 +375,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
 UNCHECKED = {"source", "masked", "notes", "warnings", "channels"}
 """What only words are made of; and names of channels, which are looked at once there are values."""
 
-RESULTS = {"Fit", "Posterior", "Match", "Study"}
+RESULTS = {"Fit", "Fits", "Posterior", "Match", "Study"}
 """Classes that fitmat makes and users do not."""
 
 WRONG = [

@@ -148,7 +148,11 @@ class Coordinates:
 
     def from_unbounded(self, base: Array, u: Array) -> Array:
         """Unbounded coordinates (k,) to a parameter vector (p,), always within the bounds."""
-        return self.filled(base, jnp.asarray(self.low) + self.span * (1.0 + jnp.sin(u)) / 2.0)
+        return self.filled(base, self.natural_of(u))
+
+    def natural_of(self, u: Numbers) -> Numbers:
+        """Unbounded to natural coordinates, (..., k) both."""
+        return self.low + self.span * (1.0 + library(u).sin(u)) / 2.0
 
     def bend(self, u: Array, slope: Float[Array, " k"]) -> Float[Array, " k"]:
         """What the sine adds to the second derivative of a cost of which ∂/∂u is given, where that is more than 0.

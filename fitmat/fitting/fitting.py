@@ -88,7 +88,7 @@ def fit(
     refuse_idle(known, fixed, chosen)
     if chosen.infers_noise:
         shown, known = Noisy(shown), _noise_priors(measurements) | known
-    held = _held(shown, fixed)
+    held = held_values(shown, fixed)
     moved = coordinates(shown, held)
     needed = moved.count + 2
     found_noise = measured_noise(measurements)
@@ -138,7 +138,7 @@ def _noise_priors(m: Measurements) -> dict[str, tuple[ArrayLike, ArrayLike]]:
     return {name: (centre, np.log(10.0) * centre) for name, centre in centres.items()}
 
 
-def _held(template: AbstractBRDF, fixed: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
+def held_values(template: AbstractBRDF, fixed: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
     """Fixed values as arrays of each parameter's size, checked against its bounds."""
     sizes = {e.name: e for e in entries(template)}
     held, values = {}, np.array(vector(template))

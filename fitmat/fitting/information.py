@@ -123,17 +123,22 @@ def _mean_square(best: AbstractBRDF, data: Data, parameters: int) -> float:
 
 
 def inverse_information(information: np.ndarray, span: np.ndarray) -> np.ndarray:
-    """The inverse of an information matrix, huge but finite along directions that the data do not determine.
+    """The inverse of information matrices, huge but finite along directions that the data do not determine.
 
     Args:
-        information: In natural coordinates, (k, k).
+        information: In natural coordinates, (…, k, k).
         span: Widths of the bounds in the same coordinates, (k,); they set the scale of "huge".
     """
     scaled = np.nan_to_num(information * np.outer(span, span))
-    unit = np.sqrt(np.maximum(np.diagonal(scaled), 1e-12))
-    eigenvalues, vectors = np.linalg.eigh(scaled / np.outer(unit, unit))
+    unit = np.sqrt(np.maximum(np.diagonal(scaled, axis1=-2, axis2=-1), 1e-12))
+    eigenvalues, vectors = np.linalg.eigh(scaled / _squared(unit))
     size = span / unit
-    return (vectors / np.maximum(eigenvalues, 1e-14)) @ vectors.T * np.outer(size, size)
+    return (vectors / np.maximum(eigenvalues, 1e-14)[..., None, :]) @ vectors.swapaxes(-1, -2) * _squared(size)
+
+
+def _squared(size: np.ndarray) -> np.ndarray:
+    """The outer product of vectors, (…, k), with themselves."""
+    return size[..., :, None] * size[..., None, :]
 
 
 def covariance(

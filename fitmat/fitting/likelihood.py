@@ -9,6 +9,7 @@ This room knows no solver, no sampler and no particular model.
 """
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
@@ -28,6 +29,9 @@ from fitmat.measurements.samples import Measurements
 from fitmat.models.around.noise import Noisy
 from fitmat.models.base import AbstractBRDF, evaluate_pairs, padded_length
 from fitmat.models.parameters import vector
+
+Total = Callable[[Array, Array], Array]
+"""Weights and what they weigh → the sum of the products."""
 
 
 class Prior(eqx.Module):
@@ -241,13 +245,15 @@ def _log_width(noise: Any, data: Data, s: Any) -> Any:
     return xp.log(data.loss.spread(data.x, noise, data.kappa, s)) - xp.log(data.kappa) - data.loss.log_peak
 
 
-def best_discrepancy(x: Samples, data: Data, start: Scalar) -> Scalar:
+def best_discrepancy(x: Any, data: Any, start: Any, total: Total = jnp.vdot, most: int = 12) -> Any:
     """The s ≥ 0 that maximises the likelihood for given model values.
 
     Args:
         x: `predicted`, (n, c).
         data: The samples.
         start: A positive first guess.
+        total: Σ weight · part; where it leaves an axis, that is of as many problems, and so are `start` and the result.
+        most: Steps.
 
     Under losses that infer none it is 0. Newton's method in log s with steps of at most 2; what falls below
     `NEGLIGIBLE` of the noise is 0.
@@ -259,9 +265,9 @@ def best_discrepancy(x: Samples, data: Data, start: Scalar) -> Scalar:
         s = jnp.exp(t)
         r = data.loss.shrink(transformed(data, s) - data.loss.transform(x, data.noise, data.kappa, s))
         logs = jnp.log(spread(data.x, data.noise, s))
-        return jnp.vdot(data.weight, 0.5 * r**2 + logs) + discrepancy_cost(data, s)
+        return total(data.weight, 0.5 * r**2 + logs) + discrepancy_cost(data, s)
 
-    one, floor = jnp.ones(()), jnp.log(NEGLIGIBLE * data.typical)
+    one, floor = jnp.ones(jnp.shape(start)), jnp.log(NEGLIGIBLE * data.typical)
 
     def step(state: tuple[Scalar, Scalar, Array]) -> tuple[Scalar, Scalar, Array]:
         t, _, count = state
@@ -271,7 +277,11 @@ def best_discrepancy(x: Samples, data: Data, start: Scalar) -> Scalar:
         return moved, jnp.abs(moved - t), count + 1
 
     begin = jnp.maximum(jnp.log(start), floor + 1.0)
-    t, _, _ = jax.lax.while_loop(lambda state: (state[1] > STILL) & (state[2] < 12), step, (begin, one, jnp.array(0)))
+
+    def moves(state: tuple[Scalar, Scalar, Array]) -> Array:
+        return jnp.any(state[1] > STILL) & (state[2] < most)
+
+    t, _, _ = jax.lax.while_loop(moves, step, (begin, one, jnp.array(0)))
     return jnp.where(t > floor + 1e-6, jnp.exp(t), 0.0)
 
 

@@ -5,7 +5,8 @@ Gives starts; refines none of them.
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -48,29 +49,30 @@ def starting_points(
         Physical parameter vectors; fewer than `count` rows where the grid is smaller.
     """
     free = [e for e in entries(model) if e.name not in held]
-    nodes = _nodes(model, [e for e in free if not e.param.weight], held)
+    grid = nodes(model, [e for e in free if not e.param.weight], held)
     weights = [e for e in free if e.param.weight]
     thinned = data.every(-(-data.x.shape[0] // MAX_ROWS))
     per_node = (2 + len(weights)) * thinned.x.size
     found = [
-        _solve_nodes(model, thinned, s, nodes[part], weights)
-        for part in slices(len(nodes), max(1, MOST_NUMBERS // per_node))
+        _solve_nodes(model, thinned, s, grid[part], weights)
+        for part in slices(len(grid), max(1, MOST_NUMBERS // per_node))
     ]
     solved, cost = (np.concatenate(part) for part in zip(*found, strict=True))
     return solved[np.argsort(np.nan_to_num(cost, nan=np.inf), kind="stable")[:count]]
 
 
-def _nodes(model: AbstractBRDF, shapes: list[Entry], held: dict[str, np.ndarray]) -> Float[np.ndarray, "k p"]:
+def nodes(model: AbstractBRDF, shapes: Sequence[Entry], held: Mapping[str, np.ndarray]) -> Float[np.ndarray, "k p"]:
+    """Parameter vectors of a grid over these parameters, everything else as in the model or as it is held."""
     base = np.array(vector(model), float)
     for entry in entries(model):
         if entry.name in held:
             base[entry.place] = held[entry.name]
     axes = [e.param.starts for e in shapes]
     chosen = list(itertools.product(*axes)) if math.prod(map(len, axes)) <= MOST_NODES else _spread_over(axes)
-    nodes = np.tile(base, (len(chosen), 1))
+    found = np.tile(base, (len(chosen), 1))
     for column, entry in enumerate(shapes):
-        nodes[:, entry.place] = np.array([node[column] for node in chosen], float)[:, None]
-    return nodes
+        found[:, entry.place] = np.array([node[column] for node in chosen], float)[:, None]
+    return found
 
 
 def _spread_over(axes: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
@@ -81,10 +83,28 @@ def _spread_over(axes: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
     return [tuple(axis[int(u * len(axis))] for axis, u in zip(axes, row, strict=True)) for row in places.tolist()]
 
 
-def _solve_nodes(
-    model: AbstractBRDF, data: Data, s: np.ndarray, nodes: Float[np.ndarray, "k p"], weights: Sequence[Entry]
-) -> tuple[Float[np.ndarray, "k p"], Float[np.ndarray, " k"]]:
-    """For every node: the vector with its weights solved, and its cost in the transform of the likelihood.
+class Lit(NamedTuple):
+    """A model at the nodes of a grid, by what it is linear in.
+
+    Attributes:
+        dark: Parameter vectors with all weights 0, (k, p).
+        offset: f κ there, (k, n, c).
+        columns: What a weight of 1 adds, (k, w, n, c).
+    """
+
+    dark: Float[np.ndarray, "k p"]
+    offset: Float[np.ndarray, "k n c"]
+    columns: Float[np.ndarray, "k w n c"]
+
+
+def lit(
+    model: AbstractBRDF,
+    nodes: Float[np.ndarray, "k p"],
+    weights: Sequence[Entry],
+    wi: Float[np.ndarray, "n 3"],
+    wo: Float[np.ndarray, "n 3"],
+) -> Lit:
+    """The model at every node without its weights, and with each.
 
     A weight with one number a channel counts in that channel only, so that one look at the model serves all its
     numbers; the tints of Disney's models, which depend on all channels, are those of white in a start.
@@ -92,12 +112,20 @@ def _solve_nodes(
     dark = nodes.copy()
     for entry in weights:
         dark[:, entry.place] = 0.0
-    lit = np.repeat(dark[:, None], 1 + len(weights), axis=1)
+    every = np.repeat(dark[:, None], 1 + len(weights), axis=1)
     for k, entry in enumerate(weights):
-        lit[:, 1 + k, entry.place] = 1.0
-    x = values(model, lit.reshape(-1, dark.shape[1]), data.wi, data.wo) * data.kappa
-    x = x.reshape(*lit.shape[:2], *data.x.shape)
-    offset, columns, predicted = x[:, 0], x[:, 1:] - x[:, :1], x[:, 0]
+        every[:, 1 + k, entry.place] = 1.0
+    x = values(model, every.reshape(-1, dark.shape[1]), wi, wo) * wi[:, 2:3]
+    x = x.reshape(*every.shape[:2], *x.shape[1:])
+    return Lit(dark, x[:, 0], x[:, 1:] - x[:, :1])
+
+
+def _solve_nodes(
+    model: AbstractBRDF, data: Data, s: np.ndarray, nodes: Float[np.ndarray, "k p"], weights: Sequence[Entry]
+) -> tuple[Float[np.ndarray, "k p"], Float[np.ndarray, " k"]]:
+    """For every node: the vector with its weights solved, and its cost in the transform of the likelihood."""
+    dark, offset, columns = lit(model, nodes, weights, data.wi, data.wo)
+    predicted = offset
     with np.errstate(all="ignore"):  # a node at which the model is not finite comes last
         if weights:
             root = np.sqrt(data.weight) / spread(data.x, data.noise, s)

@@ -75,7 +75,10 @@ class LevenbergMarquardt(optx.AbstractLeastSquaresSolver):
     def step(self, fn: Any, y: Array, args: Any, options: Any, state: _State, tags: Any) -> tuple[Array, _State, Seen]:
         """Look at the trial point, go there or not, and choose the next."""
         del options, tags
-        seen: Seen = fn(state.trial, args)[1]
+        return self.judged(y, state, fn(state.trial, args)[1])
+
+    def judged(self, y: Array, state: _State, seen: Seen) -> tuple[Array, _State, Seen]:
+        """`step` with what was seen at the trial point."""
         there, old = seen[0], state.here[0]
         first = state.steps == 0
         lengths = jnp.sqrt(jnp.diagonal(there.gram) * FIRST_DAMPING)

@@ -57,7 +57,7 @@ MANY = "lambert+phong+blinn-phong+ggx+beckmann+ward+ashikhmin-shirley"
 def test_a_small_grid_is_looked_at_whole() -> None:
     model = fm.model("lambert+ggx+phong")
     shapes = [e for e in entries(model) if not e.param.weight]
-    nodes = starts._nodes(model, shapes, {})
+    nodes = starts.nodes(model, shapes, {})
     expected = itertools.product(*(e.param.starts for e in shapes))
     assert nodes[:, [e.place.start for e in shapes]].tolist() == [list(node) for node in expected]
 
@@ -66,7 +66,7 @@ def test_of_a_grid_of_many_lobes_an_even_part_is_looked_at() -> None:
     """180 million nodes took gigabytes. Each pair of starts of two parameters has its share, to a tenth."""
     model = fm.model(MANY)
     shapes = [e for e in entries(model) if not e.param.weight]
-    nodes = starts._nodes(model, shapes, {})
+    nodes = starts.nodes(model, shapes, {})
     assert len(nodes) == starts.MOST_NODES < math.prod(len(e.param.starts) for e in shapes) / 10_000
     for one, other in itertools.combinations(shapes, 2):
         pairs = nodes[:, [one.place.start, other.place.start]]

@@ -1,0 +1,168 @@
+"""Fit one model to many surfaces that were seen from the same directions, by one compiled program.
+
+Likelihood, bounds, convergence and outcomes are those of `fitmat.fit`. It reads no file.
+"""
+
+import os
+from collections.abc import Mapping
+
+import jax
+import numpy as np
+from jaxtyping import ArrayLike, Float
+
+from fitmat import arguments
+from fitmat._types import Progress
+from fitmat.errors import FitmatError, ModelError, ReadError
+from fitmat.fitting.coordinates import coordinates
+from fitmat.fitting.fitting import held_values
+from fitmat.fitting.losses import DEFAULT, Loss
+from fitmat.fitting.losses import loss as find_loss
+from fitmat.fitting.many.fits import Fits
+from fitmat.fitting.many.gathering import padded
+from fitmat.fitting.many.lanes import Shared
+from fitmat.fitting.many.table import table
+from fitmat.fitting.many.tiles import Work, each
+from fitmat.fitting.refining import MAX_STEPS
+from fitmat.measurements.samples import default_channels
+from fitmat.models import names
+from fitmat.models.base import AbstractBRDF, direction_pairs
+from fitmat.models.parameters import entries, vector, with_vector
+from fitmat.models.registry import model
+from fitmat.models.values import at
+
+STARTS = 3
+"""Valleys of the grid from which a fit begins, at most: most surfaces have one."""
+
+
+def fit_many(
+    wi: ArrayLike,
+    wo: ArrayLike,
+    value: ArrayLike,
+    to: str | AbstractBRDF = "lambert+ggx",
+    *,
+    sigma: ArrayLike | None = None,
+    fixed: Mapping[str, ArrayLike] | None = None,
+    loss: str = DEFAULT.name,
+    masking: str | None = None,
+    starts: int = STARTS,
+    max_steps: int = MAX_STEPS,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Fits:
+    """Fit a model to many surfaces, or to each point of one, that were seen from the same directions.
+
+    Args:
+        wi: Unit vectors to the light, (n, 3) or (1, 3), local frame with the normal +z; `fitmat.directions` makes
+            them from angles.
+        wo: Unit vectors to the sensor, likewise.
+        value: BRDF values in sr⁻¹, (…, n, c) for c channels, or (m, n) for m surfaces of one channel; NaN is masked.
+        to: A model name ("lambert+ggx"), or a model whose shapes and static choices are used.
+        sigma: Standard deviation of the noise: a number, or what has the shape of `value`. Where it is None no noise is
+            looked for, and all scatter counts as the model's misfit.
+        fixed: Parameters to hold, by name, the same for all: `{"ks": 1.0}`.
+        loss: As in `fitmat.fit`, but for those that infer the noise.
+        masking: Static masking choice for the microfacet lobes of a named model.
+        starts: From how many valleys of the start grid a fit begins, at most.
+        max_steps: Levenberg–Marquardt iterations per start.
+        threads: How many work side by side; None for one for each core.
+        progress: Called with what is done, how many surfaces are done, and how many there are.
+
+    Returns:
+        `Fits`; a surface that cannot be fitted is an outcome, not an exception.
+
+    Raises:
+        FitmatError: float64 is off, shapes do not fit, the model is unknown, or nothing is left to fit.
+
+    Example:
+        >>> wi, wo = directions(30, degrees=True), directions([0, 15, 30, 45], 180, degrees=True)  # doctest: +SKIP
+        >>> fit_many(wi, wo, texture, "lambert+ggx", fixed={"ks": 1.0})["alpha"]  # doctest: +SKIP
+    """
+    if not jax.config.read("jax_enable_x64"):
+        raise FitmatError(
+            'fitmat needs 64-bit floats: run jax.config.update("jax_enable_x64", True) before building arrays.'
+        )
+    arguments.kind("to", to, str, AbstractBRDF)
+    arguments.named(fixed=fixed)
+    for name, given in (("starts", starts), ("max_steps", max_steps)):
+        arguments.whole(name, given, 1)
+    arguments.whole("threads", threads, 1, optional=True)
+    arguments.function("progress", progress)
+    pair = _directions(wi, wo)
+    numbers = _values(value, len(pair[0]))
+    noise = None if sigma is None else _noise(sigma, numbers, np.shape(value))
+    shared, held = _shared(pair, numbers.shape[-1], to, fixed or {}, find_loss(loss), masking)
+    if noise is None and shared.loss.needs_noise:
+        raise FitmatError(
+            f"sigma is None, expected the noise: the loss {shared.loss.name} needs it. Give it, or another."
+        )
+    axes, flat = numbers.shape[:-2], numbers.reshape(-1, *numbers.shape[-2:])
+    noise = None if noise is None else noise.reshape(flat.shape)
+    work, count = Work(shared, table(shared, held), starts, max_steps), threads or os.cpu_count() or 1
+    size = work.size(len(flat), count)
+    found = each(
+        lambda part: work.fitted(flat[part], None if noise is None else noise[part], size),
+        len(flat),
+        size,
+        count,
+        progress,
+    )
+    shaped = {name: part.reshape(*axes, *part.shape[1:]) for name, part in found.items()}
+    return Fits(shared.template, default_channels(numbers.shape[-1]), held, **shaped)
+
+
+def _directions(wi: ArrayLike, wo: ArrayLike) -> list[Float[np.ndarray, "n 3"]]:
+    pair = direction_pairs(wi, wo)
+    for name, w in zip(("wi", "wo"), pair, strict=True):
+        length = np.linalg.norm(w, axis=1)
+        if not np.allclose(length, 1.0, atol=1e-6):
+            row = int(np.argmax(np.abs(np.nan_to_num(length) - 1.0)))
+            raise ModelError(f"{name} row {row} has length {length[row]:.6g}: expected unit vectors.")
+    return pair
+
+
+def _values(given: ArrayLike, rows: int) -> Float[np.ndarray, "... n c"]:
+    """The values with an axis for the channels."""
+    found = arguments.numbers("value", given)
+    shaped = found[..., None] if found.ndim == 2 else found
+    if shaped.ndim < 3 or shaped.shape[-2] != rows or not shaped.size:
+        raise ReadError(
+            f"value has shape {found.shape}, expected (…, {rows}, c) for {rows} pairs of directions, or (m, {rows})."
+        )
+    return shaped
+
+
+def _noise(given: ArrayLike, value: np.ndarray, shape: tuple[int, ...]) -> Float[np.ndarray, "... n c"]:
+    found = arguments.numbers("sigma", given)
+    if found.shape not in ((), shape):
+        raise ReadError(f"sigma has shape {found.shape}, expected one number, or {shape} as value.")
+    return np.broadcast_to(found, shape).reshape(value.shape)
+
+
+def _shared(
+    pair: list[np.ndarray],
+    channels: int,
+    to: str | AbstractBRDF,
+    fixed: Mapping[str, ArrayLike],
+    loss: Loss,
+    masking: str | None,
+) -> tuple[Shared, dict[str, np.ndarray]]:
+    """What all fits share, and what is fixed."""
+    if masking is not None and not isinstance(to, str):
+        raise ModelError(
+            f"masking = {masking!r} beside a model, expected it with a name: a model has its own. Leave it out."
+        )
+    if loss.infers_noise:
+        raise ModelError(f"loss is {loss.name!r}, expected one that infers no noise: many fits look at no neighbours.")
+    template = model(to, channels=channels, masking=masking) if isinstance(to, str) else to
+    held = held_values(template, names.own(template.name, {e.name for e in entries(template)}, fixed))
+    moved = coordinates(template, held)
+    if not moved.count:
+        raise ModelError(f"every parameter of {template.name} is fixed, expected one that is not: nothing is fitted.")
+    values = np.array(vector(template), float)
+    for entry in entries(template):
+        values[entry.place] = held.get(entry.name, values[entry.place])
+    template = with_vector(template, values)
+    shown = at(template, *(w[:1] for w in pair)).shape[1]
+    if shown not in (1, channels):
+        raise ModelError(f"the model has {shown} channels and the values {channels}: expected as many.")
+    return Shared(template, padded(pair[0]), padded(pair[1]), moved, loss, channels), held
