@@ -13,9 +13,16 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from fitmat.batches.atlas import SUFFIX
 from fitmat.batches.batch import PAGE, Batch, batch
+from fitmat.batches.textures import fit_texture
 from fitmat.cli import interrupts, process, session
+from fitmat.errors import FitmatError
+from fitmat.studies.plan import DEFAULT_MODELS
 from fitmat.text import visible
+
+TEXTURE = ("models", "loss", "masking", "fixed", "seed", "constants")
+"""Of what the flags say, what a texture takes; without draws the seed is of no consequence."""
 
 MOST = 20
 """Rows that are shown; the table has all."""
@@ -53,6 +60,54 @@ def run(
     except KeyboardInterrupt:
         process.say(f"fitmat: interrupted; what was done is kept in {folder}: the same command goes on.", err=True)
         raise SystemExit(interrupts.INTERRUPTED) from None
+
+
+def is_texture(sources: Sequence[Path]) -> bool:
+    """Whether what is given is one texture, and not files of measurements."""
+    return len(sources) == 1 and sources[0].suffix.lower() == SUFFIX
+
+
+def texture(
+    source: Path,
+    folder: Path,
+    jobs: Path | None,
+    reading: Mapping[str, Any],
+    studying: Mapping[str, Any],
+    processes: int | None,
+) -> None:
+    """Fit every point of a texture, and print how the fits ended; Ctrl-C ends it, and what was done is kept.
+
+    Args:
+        source: The atlas.
+        folder: Where to.
+        jobs: As the other flags of no use here, which are refused.
+        reading: Arguments of `fitmat.read`.
+        studying: Arguments of `fitmat.study`, of which a texture takes some.
+        processes: How many threads work side by side.
+
+    Raises:
+        FitmatError: as `fit_texture`, or a flag is of no use to a texture.
+        SystemExit: it was interrupted.
+    """
+    said = {"jobs": jobs, **reading, **reading["constants"], **studying, "instrument": not reading["instrument"].ideal}
+    idle = [
+        name for name, given in said.items() if name not in (*TEXTURE, "constants") and given not in (None, False, {})
+    ]
+    if idle:
+        raise FitmatError(f"{source} is a texture, for which {idle[0]} means nothing: expected no flag for it.")
+    models = studying["models"]
+    model = DEFAULT_MODELS[-1] if models == ",".join(DEFAULT_MODELS) else models
+    if "," in model:
+        raise FitmatError(f"--models {models} for a texture, expected one: every point has the same model.")
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with session.watch() as watch:
+            told = {name: studying[name] for name in ("loss", "masking", "fixed")}
+            found = fit_texture(source, folder, model, progress=watch, threads=processes, **told)
+    except KeyboardInterrupt:
+        process.say(f"fitmat: interrupted; what was done is kept in {folder}: the same command goes on.", err=True)
+        raise SystemExit(interrupts.INTERRUPTED) from None
+    process.say(f"{found}\n\nArrays: {found.file}")
 
 
 def show(found: Batch, screen: Console | None = None) -> None:

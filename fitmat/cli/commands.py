@@ -276,13 +276,16 @@ def batch(
     ior: IorFlag = None,
     tilt: TiltFlag = False,
 ) -> None:
-    """Fit every file of a folder or a list, and write one table of all."""
+    """Fit every file of a folder or a list, or every point of a texture, and write one table of all."""
     process.set_up()
     from fitmat.cli import batch, fit
 
     told = {"models": models, "loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
     told |= {"sampling": mcmc} | fit.known(fix or [], prior or [])
-    found = batch.run(files or [], out, jobs, reading | {"instrument": instrument}, told, processes)
+    read = reading | {"instrument": instrument}
+    if batch.is_texture(files or []):
+        return batch.texture((files or [])[0], out, jobs, read, told, processes)
+    found = batch.run(files or [], out, jobs, read, told, processes)
     batch.show(found)
     if found.counts["refused"]:
         raise typer.Exit(NOT_CONVERGED)

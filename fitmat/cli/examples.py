@@ -43,7 +43,11 @@ BATCH = (
     "Written to --out: index.html, a line for each file; results.parquet, one row for each file and model with every "
     "parameter, its interval, the doubts and the match. A file that cannot be used is a row with its sentence. "
     "Interrupted or killed, the same command goes on; a file that changed is done again.\n\n"
+    "One .npz file with an array value (rows, columns, samples, channels) or (points, samples, channels) is a texture: "
+    "its directions are wi and wo, or theta_i, theta_o, phi_i, phi_o in degrees, the same at every point; sigma if it "
+    "is known. texture.npz has every parameter with its standard deviation, and the outcome, at every point.\n\n"
     "Examples:\n\n  fitmat batch scans --out results\n\n"
+    "  fitmat batch atlas.npz --models lambert+ggx --loss gaussian\n\n"
     "  fitmat batch 'scans/*.csv' --models lambert+ggx --fix ks=1\n\n"
     "  fitmat batch --jobs jobs.csv"
 )

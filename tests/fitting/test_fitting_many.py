@@ -13,7 +13,7 @@ from fitmat.fitting.concluding import RESULTS
 from fitmat.fitting.losses import LOSSES
 from fitmat.fitting.many import tiles
 from fitmat.fitting.many.concluding import OUTCOMES, TOO_FEW
-from fitmat.fitting.many.fitting_many import _shared
+from fitmat.fitting.many.fitting_many import shared_by_all
 from fitmat.fitting.many.gathering import gathered
 from fitmat.fitting.many.table import begin_many, table
 from fitmat.fitting.refining import SETTLED
@@ -199,7 +199,7 @@ def test_a_texture_keeps_its_shape() -> None:
 
 def test_a_grid_has_valleys() -> None:
     """The first start is the node that a single fit would try first where the noise is Gaussian."""
-    shared, held = _shared([WI, WO], 1, "lambert+ggx", {}, LOSSES["gaussian"], None)
+    shared, held = shared_by_all([WI, WO], 1, "lambert+ggx", {}, LOSSES["gaussian"], None)
     known = table(shared, held)
     truth = fm.evaluate(fm.model("lambert+ggx", channels=1, kd=0.4, ks=0.8, alpha=0.25, eta=1.5), WI, WO)
     samples = gathered(shared, truth[None], None, 1)

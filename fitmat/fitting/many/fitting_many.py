@@ -90,7 +90,7 @@ def fit_many(
     pair = _directions(wi, wo)
     numbers = _values(value, len(pair[0]))
     noise = None if sigma is None else _noise(sigma, numbers, np.shape(value))
-    shared, held = _shared(pair, numbers.shape[-1], to, fixed or {}, find_loss(loss), masking)
+    shared, held = shared_by_all(pair, numbers.shape[-1], to, fixed or {}, find_loss(loss), masking)
     if noise is None and shared.loss.needs_noise:
         raise FitmatError(
             f"sigma is None, expected the noise: the loss {shared.loss.name} needs it. Give it, or another."
@@ -138,7 +138,7 @@ def _noise(given: ArrayLike, value: np.ndarray, shape: tuple[int, ...]) -> Float
     return np.broadcast_to(found, shape).reshape(value.shape)
 
 
-def _shared(
+def shared_by_all(
     pair: list[np.ndarray],
     channels: int,
     to: str | AbstractBRDF,
@@ -146,7 +146,19 @@ def _shared(
     loss: Loss,
     masking: str | None,
 ) -> tuple[Shared, dict[str, np.ndarray]]:
-    """What all fits share, and what is fixed."""
+    """What all fits share, and what is fixed.
+
+    Args:
+        pair: Unit vectors to the light and to the sensor.
+        channels: c.
+        to: A model, or its name.
+        fixed: Parameters to hold, by name.
+        loss: What is minimised.
+        masking: Of a named model.
+
+    Raises:
+        FitmatError: the model is unknown or has other channels, or nothing is left to fit.
+    """
     if masking is not None and not isinstance(to, str):
         raise ModelError(
             f"masking = {masking!r} beside a model, expected it with a name: a model has its own. Leave it out."

@@ -1,0 +1,129 @@
+"""Atlas: a texture's measurements in one .npz file, the same directions at every point, read and checked.
+
+It fits nothing.
+"""
+
+import dataclasses
+import zipfile
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from fitmat import arguments
+from fitmat.errors import ReadError
+from fitmat.maths.directions import directions
+from fitmat.measurements.samples import default_channels
+from fitmat.text import brief, visible
+
+SUFFIX = ".npz"
+"""How the names of such files end."""
+
+ANGLES = ("theta_i", "theta_o", "phi_i", "phi_o")
+"""Arrays of angles in degrees, in place of wi and wo."""
+
+KNOWN = ("value", "sigma", "wi", "wo", *ANGLES, "channels")
+"""Arrays that an atlas may hold."""
+
+
+UNREADABLE = (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error)
+"""What `unpacked` may raise of a damaged file."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Atlas:
+    """A texture's measurements.
+
+    Attributes:
+        value: BRDF in sr⁻¹, (rows, columns, n, c) or (points, n, c).
+        sigma: Standard deviation of its noise, one number or as `value`; None where unknown.
+        wi: Unit vectors to the light, (n, 3).
+        wo: Unit vectors to the sensor, (n, 3).
+        channels: c names.
+    """
+
+    value: Float[np.ndarray, "... n c"]
+    sigma: np.ndarray | None
+    wi: Float[np.ndarray, "n 3"]
+    wo: Float[np.ndarray, "n 3"]
+    channels: tuple[str, ...]
+
+    __repr__ = brief
+
+
+def unpacked(path: Path) -> dict[str, np.ndarray]:
+    """Every array of a .npz file; nothing is unpickled."""
+    with path.open("rb") as file:
+        archive = np.load(file, allow_pickle=False)
+        if isinstance(archive, np.ndarray):
+            raise ValueError("it is a single array")
+        return {name: archive[name] for name in archive.files}
+
+
+def read_atlas(path: Path) -> Atlas:
+    """The arrays of a file, checked.
+
+    Args:
+        path: A .npz file with `value`, the directions `wi` and `wo` (n, 3), or `theta_i`, `theta_o` and if need be
+            `phi_i` (else 0) and `phi_o` (else 180) in degrees, (n,) each or one number; and if need be `sigma`, and
+            `channels`, their names.
+
+    Raises:
+        ReadError: it cannot be read, something is missing, or shapes do not fit.
+    """
+    try:
+        every = unpacked(path)
+    except UNREADABLE as error:
+        raise ReadError(f"{path}: no atlas can be read ({visible(str(error))}). Write it with numpy.savez.") from error
+    found = {name: part for name, part in every.items() if name in KNOWN}
+    odd = sorted(set(every) - set(KNOWN))
+    if odd or "value" not in found:
+        got = f"an array {visible(odd[0])!r}" if odd else f"no array value, but {', '.join(found) or 'none'}"
+        raise ReadError(f"{path}: {got}, expected value and any of {', '.join(KNOWN[1:])}.")
+    value = arguments.numbers(f"value of {path}", found["value"])
+    if value.ndim not in (3, 4) or not value.size:
+        raise ReadError(
+            f"{path}: value has shape {value.shape}, expected (rows, columns, samples, channels) or "
+            f"(points, samples, channels), none of them 0."
+        )
+    wi, wo = _directions(path, found)
+    if len(wi) != value.shape[-2]:
+        raise ReadError(f"{path}: {len(wi)} pairs of directions for {value.shape[-2]} samples, expected as many.")
+    sigma = None if "sigma" not in found else arguments.numbers(f"sigma of {path}", found["sigma"])
+    if sigma is not None and sigma.shape not in ((), value.shape):
+        raise ReadError(f"{path}: sigma has shape {sigma.shape}, expected one number, or {value.shape} as value.")
+    return Atlas(value, sigma, wi, wo, _channels(path, found, value.shape[-1]))
+
+
+def _directions(path: Path, found: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    vectors, angles = [name for name in ("wi", "wo") if name in found], [name for name in ANGLES if name in found]
+    if len(vectors) == 2 and not angles:
+        wi, wo = (arguments.numbers(f"{name} of {path}", found[name]) for name in vectors)
+        for name, w in (("wi", wi), ("wo", wo)):
+            if w.ndim != 2 or w.shape[1] != 3 or not np.allclose(np.linalg.norm(w, axis=1), 1.0, atol=1e-6):
+                raise ReadError(f"{path}: {name} of shape {w.shape}, expected (n, 3) unit vectors.")
+        if len(wi) != len(wo):
+            raise ReadError(f"{path}: {len(wi)} rows of wi and {len(wo)} of wo, expected as many.")
+        return wi, wo
+    if vectors or not {"theta_i", "theta_o"} <= set(angles):
+        got = ", ".join([*vectors, *angles]) or "none"
+        raise ReadError(f"{path}: directions {got}, expected wi and wo, or theta_i and theta_o (degrees).")
+    told = {"phi_i": np.zeros(()), "phi_o": np.full((), 180.0)} | {name: found[name] for name in angles}
+    try:
+        theta_i, theta_o, phi_i, phi_o = np.broadcast_arrays(*(np.atleast_1d(told[name]) for name in ANGLES))
+    except ValueError:
+        shapes = ", ".join(f"{name} {told[name].shape}" for name in ANGLES)
+        raise ReadError(f"{path}: angles of shapes {shapes}, expected (n,) or one number each.") from None
+    return directions(theta_i, phi_i, degrees=True), directions(theta_o, phi_o, degrees=True)
+
+
+def _channels(path: Path, found: Mapping[str, np.ndarray], count: int) -> tuple[str, ...]:
+    if "channels" not in found:
+        return default_channels(count)
+    names = tuple(str(name) for name in np.atleast_1d(found["channels"]).ravel())
+    if len(names) != count or len(set(names)) != count:
+        got = f"channels {', '.join(map(visible, names))} for {count} columns of values"
+        raise ReadError(f"{path}: {got}, expected one name each, all different.")
+    return names

@@ -1,0 +1,153 @@
+"""Textures: an atlas fitted tile by tile, each tile kept when it is done, and the arrays of all points.
+
+What was done before is not done again. The fits are `fitmat.fit_many`'s.
+"""
+
+import dataclasses
+import hashlib
+import io
+import json
+import os
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fitmat import arguments, files
+from fitmat._types import Progress
+from fitmat.batches.atlas import UNREADABLE, Atlas, read_atlas, unpacked
+from fitmat.fitting.losses import DEFAULT, loss
+from fitmat.fitting.many.concluding import OUTCOMES
+from fitmat.fitting.many.fits import Fits
+from fitmat.fitting.many.fitting_many import fit_many, shared_by_all
+from fitmat.models.values import slices
+from fitmat.text import brief
+
+RESULT, PARTS = "texture.npz", "parts"
+"""What a run leaves in its folder: the arrays of all points, and those of each tile by key."""
+
+TILE = 16384
+"""Points that are fitted, and kept, at a time."""
+
+KEPT = ("values", "sd", "outcome", "discrepancy", "log_likelihood", "steps", "n_values")
+"""Fields of `Fits` that a tile keeps."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Texture:
+    """What was found of a texture.
+
+    Attributes:
+        file: The arrays on disk: each parameter by its name, `NAME_sd`, `outcome` with the `outcomes` that its numbers
+            mean, `discrepancy`, `n_values`, and the names of the `channels`.
+        fits: The same.
+        earlier: Points that an earlier run had fitted.
+    """
+
+    file: Path
+    fits: Fits
+    earlier: int
+
+    __repr__ = brief
+
+    def __str__(self) -> str:
+        """How many ended how."""
+        return f"{self.fits}{f' {self.earlier} known from an earlier run.' if self.earlier else ''}"
+
+
+def fit_texture(
+    source: str | os.PathLike[str],
+    folder: str | os.PathLike[str],
+    model: str = "lambert+ggx",
+    *,
+    progress: Progress | None = None,
+    **told: Any,
+) -> Texture:
+    """Fit a model to every point of an atlas.
+
+    Args:
+        source: The atlas, as `read_atlas` takes it.
+        folder: For `texture.npz`, and what is kept to go on after an interruption.
+        model: Name of the model.
+        progress: Called with what is done, how many points are done, and how many there are.
+        **told: `fixed`, `loss`, `masking`, `starts`, `max_steps` and `threads` of `fitmat.fit_many`.
+
+    Raises:
+        FitmatError: the atlas cannot be read, the arguments do not fit, another run writes there, or the disk refuses.
+
+    Example:
+        >>> fit_texture("atlas.npz", "out").fits["alpha"]  # doctest: +SKIP
+    """
+    arguments.kind("source", source, str, os.PathLike)
+    arguments.kind("folder", folder, str, os.PathLike)
+    arguments.kind("model", model, str)
+    atlas, target, say = read_atlas(Path(source)), Path(folder), progress or (lambda *_: None)
+    given = told.get("fixed") or {}, loss(told.get("loss", DEFAULT.name)), told.get("masking")
+    shared, held = shared_by_all([atlas.wi, atlas.wo], len(atlas.channels), model, *given)
+    axes = atlas.value.shape[:-2]
+    count = int(np.prod(axes))
+    tiles: list[dict[str, np.ndarray]] = []
+    earlier = 0
+    with files.alone(target):
+        for part in slices(count, TILE):
+            value, sigma = _tile(atlas, part)
+            kept = target / PARTS / f"{_key(atlas, value, sigma, model, told)}.npz"
+            tile = _read(kept, len(value))
+            if tile is None:
+                fitted = fit_many(atlas.wi, atlas.wo, value, model, sigma=sigma, **told)
+                tile = {name: getattr(fitted, name) for name in KEPT}
+                files.write_bytes(kept, _packed(tile))
+            else:
+                earlier += len(value)
+            tiles.append(tile)
+            say(f"fitting {count} points", part.stop, count)
+        whole = {name: np.concatenate([tile[name] for tile in tiles]) for name in KEPT}
+        shaped = {name: part.reshape(*axes, *part.shape[1:]) for name, part in whole.items()}
+        fits = Fits(shared.template, atlas.channels, held, **shaped)
+        return Texture(files.write_bytes(target / RESULT, _packed(_arrays(fits))), fits, earlier)
+
+
+def _tile(atlas: Atlas, part: slice) -> tuple[np.ndarray, np.ndarray | None]:
+    """The values and the noise of some points."""
+
+    def some(every: np.ndarray) -> np.ndarray:
+        return every.reshape(-1, *every.shape[-2:])[part]
+
+    sigma = atlas.sigma
+    return some(atlas.value), sigma if sigma is None or sigma.ndim == 0 else some(sigma)
+
+
+def _key(atlas: Atlas, value: np.ndarray, sigma: np.ndarray | None, model: str, told: Mapping[str, Any]) -> str:
+    """The name under which a tile is kept: of what is fitted, how, and by which fitmat."""
+    how = {name: given for name, given in told.items() if name != "threads"} | {"model": model}
+    words = json.dumps([how, version("fitmat"), value.shape], sort_keys=True, default=str)
+    found = hashlib.sha256(words.encode())
+    for part in (value, np.zeros(0) if sigma is None else sigma, atlas.wi, atlas.wo):
+        found.update(np.ascontiguousarray(part, float).tobytes())
+    return found.hexdigest()[:32]
+
+
+def _read(kept: Path, count: int) -> dict[str, np.ndarray] | None:
+    """A tile that an earlier run left; None where there is none that is whole."""
+    try:
+        tile = unpacked(kept)
+        return tile if all(len(tile[name]) == count for name in KEPT) else None
+    except UNREADABLE:
+        return None
+
+
+def _packed(arrays: Mapping[str, np.ndarray]) -> bytes:
+    memory = io.BytesIO()
+    np.savez_compressed(memory, **arrays)
+    return memory.getvalue()
+
+
+def _arrays(fits: Fits) -> dict[str, np.ndarray]:
+    """What the file of all points holds."""
+    found: dict[str, np.ndarray] = {}
+    for entry in fits.entries:
+        found |= {entry.name: fits[entry.name], f"{entry.name}_sd": fits.sd_of(entry.name)}
+    found |= {"outcome": fits.outcome, "outcomes": np.array(list(OUTCOMES)), "channels": np.array(fits.channels)}
+    return found | {"discrepancy": fits.discrepancy, "n_values": fits.n_values}

@@ -1,0 +1,193 @@
+"""Textures: an atlas is fitted as its arrays are, tiles are kept and used again, and wrong files are one sentence."""
+
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import fitmat as fm
+from fitmat.batches import textures
+from fitmat.batches.atlas import read_atlas
+from fitmat.batches.textures import fit_texture
+from fitmat.cli.application import app
+from fitmat.errors import FitmatError, OutputError
+
+TOLD: dict[str, Any] = {"loss": "gaussian", "fixed": {"ks": 1.0, "eta": 1.5}}
+
+ROWS, COLUMNS, SAMPLES = 3, 4, 24
+
+
+def arrays() -> dict[str, np.ndarray]:
+    """A texture of which the roughness grows to the right, in angles; one point was not measured."""
+    rng = np.random.default_rng(1)
+    theta_o = np.linspace(-60.0, 75.0, SAMPLES)
+    wi, wo = fm.directions(np.full(SAMPLES, 30.0), degrees=True), fm.directions(theta_o, 180.0, degrees=True)
+    value = np.empty((ROWS, COLUMNS, SAMPLES, 1))
+    for row in range(ROWS):
+        for column in range(COLUMNS):
+            made = fm.model("lambert+ggx", channels=1, kd=0.2 + 0.2 * row, alpha=0.1 + 0.1 * column, eta=1.5)
+            value[row, column] = fm.evaluate(made, wi, wo)
+    sigma = 0.01 * value
+    value += sigma * rng.normal(size=value.shape)
+    value[1, 2] = np.nan
+    return {"value": value, "sigma": sigma, "theta_i": np.array(30.0), "theta_o": theta_o}
+
+
+@pytest.fixture
+def atlas(tmp_path: Path) -> Path:
+    path = tmp_path / "atlas.npz"
+    told: dict[str, Any] = arrays()
+    np.savez(path, **told)
+    return path
+
+
+def test_an_atlas_is_fitted_as_its_arrays_are(atlas: Path, tmp_path: Path) -> None:
+    told = arrays()
+    wi = fm.directions(np.full(SAMPLES, 30.0), degrees=True)
+    wo = fm.directions(told["theta_o"], 180.0, degrees=True)
+    direct = fm.fit_many(wi, wo, told["value"], sigma=told["sigma"], **TOLD)
+    found = fit_texture(atlas, tmp_path / "out", **TOLD)
+    np.testing.assert_array_equal(found.fits.values, direct.values)
+    with np.load(tmp_path / "out" / "texture.npz", allow_pickle=False) as kept:
+        np.testing.assert_array_equal(kept["alpha"], direct["alpha"])
+        np.testing.assert_array_equal(kept["kd_sd"], direct.sd_of("kd"))
+        names = kept["outcomes"][kept["outcome"]]
+    assert names[1, 2] == "too_few"
+    assert np.count_nonzero(names == "converged") == ROWS * COLUMNS - 1
+    steps = np.diff(np.nanmean(direct["alpha"], axis=0))
+    np.testing.assert_allclose(steps, 0.1, atol=0.02)  # the roughness of the truth, 1 % noise
+    assert "11 converged, 1 too_few" in str(found)
+
+
+def test_tiles_are_kept_and_used_again(atlas: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(textures, "TILE", 5)
+    out = tmp_path / "out"
+    calls: list[int] = []
+
+    def stopping(*given: Any, **told: Any) -> fm.Fits:
+        calls.append(len(given[2]))
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return fm.fit_many(*given, **told)
+
+    monkeypatch.setattr(textures, "fit_many", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        fit_texture(atlas, out, **TOLD)
+    kept = list((out / "parts").iterdir())
+    assert len(kept) == 1
+    first = fit_texture(atlas, out, **TOLD)
+    assert (first.earlier, sum(calls[2:])) == (4, 8)
+    calls.clear()
+    calls += [0, 0]
+    kept[0].write_bytes(kept[0].read_bytes()[:200])
+    again = fit_texture(atlas, out, **TOLD)
+    assert (again.earlier, sum(calls)) == (8, 4)
+    np.testing.assert_array_equal(again.fits.values, first.fits.values)
+    calls.clear()
+    calls += [0, 0]
+    other: dict[str, Any] = {"loss": "default"}
+    assert fit_texture(atlas, out, **other).earlier == 0
+
+
+def test_a_full_disk_is_one_sentence(atlas: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(path: Path, content: bytes) -> None:
+        raise OutputError(f"{path}: cannot be written (No space left on device); choose another place.")
+
+    monkeypatch.setattr(textures.files, "write_bytes", full)
+    with pytest.raises(FitmatError, match="No space left on device"):
+        fit_texture(atlas, tmp_path / "out", **TOLD)
+
+
+@pytest.fixture
+def handler() -> Iterator[None]:
+    """The answer to Ctrl-C, which a command changes, as it was."""
+    before = signal.getsignal(signal.SIGINT)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+UP = np.tile([0.0, 0.0, 1.0], (SAMPLES, 1))
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"value": None}, "no array value, but sigma, theta_i, theta_o, expected value and any of"),
+        ({"values": np.ones(3)}, "an array 'values', expected value and any of sigma"),
+        ({"value": np.ones((4, 24))}, r"value has shape \(4, 24\), expected \(rows, columns, samples, channels\) or"),
+        ({"value": np.ones((4, 23, 1))}, "24 pairs of directions for 23 samples, expected as many"),
+        ({"value": np.array([["a"]])}, "value of .*atlas.npz"),
+        ({"sigma": np.ones(3)}, r"sigma has shape \(3,\), expected one number, or"),
+        ({"theta_o": None}, "directions theta_i, expected wi and wo, or theta_i and theta_o"),
+        ({"wi": UP}, "directions wi, theta_i, theta_o, expected wi and wo, or"),
+        ({"theta_i": np.ones(5)}, r"angles of shapes theta_i \(5,\), theta_o \(24,\)"),
+        ({"theta_i": np.array(120.0)}, "120"),
+        (
+            {"theta_i": None, "theta_o": None, "wi": 2 * UP, "wo": UP},
+            r"wi of shape \(24, 3\), expected .* unit vectors",
+        ),
+        ({"channels": np.array(["r", "g"])}, "channels r, g for 1 columns of values"),
+    ],
+)
+def test_wrong_arrays_are_one_sentence(changed, message, tmp_path: Path) -> None:
+    path = tmp_path / "atlas.npz"
+    kept: dict[str, Any] = {name: part for name, part in (arrays() | changed).items() if part is not None}
+    np.savez(path, **kept)
+    with pytest.raises(FitmatError, match=message):
+        read_atlas(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 damaged", b"\x93NUMPY", b"theta_i,theta_o\n"])
+def test_damaged_files_are_one_sentence(content, tmp_path: Path) -> None:
+    path = tmp_path / "atlas.npz"
+    path.write_bytes(content)
+    with pytest.raises(FitmatError, match=r"atlas\.npz: no atlas can be read"):
+        read_atlas(path)
+
+
+def test_vectors_serve_as_angles_do(atlas: Path, tmp_path: Path) -> None:
+    by_angle = read_atlas(atlas)
+    path = tmp_path / "vectors.npz"
+    np.savez(path, value=by_angle.value, wi=by_angle.wi, wo=by_angle.wo)
+    found = read_atlas(path)
+    np.testing.assert_array_equal(found.wo, by_angle.wo)
+    assert found.sigma is None
+
+
+@pytest.mark.usefixtures("handler")
+def test_the_command_fits_a_texture(atlas: Path, tmp_path: Path) -> None:
+    words = [
+        "batch",
+        str(atlas),
+        "--out",
+        str(tmp_path / "out"),
+        "--loss",
+        "gaussian",
+        "--fix",
+        "ks=1",
+        "--fix",
+        "eta=1.5",
+    ]
+    ran = CliRunner().invoke(app, words)
+    assert ran.exit_code == 0, ran.output
+    assert "12 fits of lambert+ggx: 11 converged, 1 too_few." in ran.output
+    assert (tmp_path / "out" / "texture.npz").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--models", "lambert,ggx"], "expected one: every point has the same model"),
+        (["--tilt"], "is a texture, for which tilt means nothing"),
+        (["--mcmc"], "is a texture, for which sampling means nothing"),
+        (["--theta-i", "30"], "is a texture, for which theta_i means nothing"),
+    ],
+)
+def test_what_means_nothing_for_a_texture_is_refused(words, message, atlas: Path, tmp_path: Path) -> None:
+    ran = CliRunner().invoke(app, ["batch", str(atlas), "--out", str(tmp_path / "out"), *words])
+    assert ran.exit_code == 1
+    assert message in str(ran.exception) + ran.output
