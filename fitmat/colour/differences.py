@@ -27,8 +27,22 @@ Paravina et al. 2015 (J. Esthet. Restor. Dent. 27): half of the observers see 0.
 that 1 is just noticeable (ITU-R BT.2124).
 """
 
+SEEN = (
+    (1.0, "not visible"),
+    (2.0, "for trained eyes"),
+    (3.5, "just visible"),
+    (5.0, "clearly visible"),
+    (np.inf, "different colours"),
+)
+"""ΔE2000 up to which a difference side by side is called so (Mokrzycki & Tatol 2011)."""
+
 HIGHEST_LUMINANCE = 10_000.0
 """What the perceptual quantiser of SMPTE ST 2084 can say at most, in cd/m²."""
+
+
+def seen(delta: float) -> str:
+    """What an eye sees of a ΔE2000, in the words of `SEEN`."""
+    return next((words for limit, words in SEEN if delta < limit), SEEN[-1][1])
 
 
 def delta_e_2000(

@@ -239,7 +239,7 @@ def _pattern(fit: Fit) -> str:
     signed = z[regions[name]][weight[regions[name]]]
     side = np.sum(signed) / max(np.sum(np.abs(signed)), 1e-300)
     word = "too dark" if side > 0.5 else "too bright" if side < -0.5 else "partly too bright and partly too dark"
-    return f"the residuals are largest {name}, where it is {word}"
+    return f"of the angles measured, the residuals are largest {name}, where it is {word}"
 
 
 def _mean_square(z: np.ndarray, weight: np.ndarray) -> float:

@@ -15,7 +15,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from fitmat.colour.differences import CLEARLY_VISIBLE, JUST_NOTICEABLE, WHITE_LUMINANCE
+from fitmat.colour.differences import SEEN, WHITE_LUMINANCE
 from fitmat.fitting.concluding import RESULTS
 from fitmat.judgement import budget
 from fitmat.match.ablation import EXPLAINS
@@ -26,7 +26,7 @@ from fitmat.models.metrics import METRICS
 from fitmat.reports import ball, drawings
 from fitmat.reports.rows import brief_rows, parameter_rows, prior_rows
 from fitmat.reports.snippets import snippets
-from fitmat.studies.cards import best, cards, ordered, title
+from fitmat.studies.cards import best, cards, ordered, title, wider
 from fitmat.studies.citations import bibtex
 from fitmat.text import visible_in
 from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAIL_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS
@@ -78,6 +78,7 @@ def to_html(record: Mapping[str, Any], figures: Mapping[str, Any]) -> str:
             figures=drawn,
             cards=cards(told),
             best=best(told),
+            wider=wider(told),
             cite=bibtex(told),
             fits=ordered(told),
             policy=POLICY.format(hashes),
@@ -101,8 +102,7 @@ _WORDS = {
     "similar": SIMILAR,
     "separated": SEPARATED,
     "explains": EXPLAINS,
-    "just_noticeable": JUST_NOTICEABLE,
-    "clearly_visible": CLEARLY_VISIBLE,
+    "seen_words": SEEN,
     "white_luminance": WHITE_LUMINANCE,
     "enough": {"tau": ENOUGH_TAU, "ess": ENOUGH_ESS, "tail_ess": ENOUGH_TAIL_ESS, "rhat": GOOD_RHAT},
 }
@@ -204,8 +204,9 @@ _TOGETHER = re.compile(r"(?:(?<=F0)|(?<=α)|(?<=ΔE2000)|(?<=±)) | (?=[%±×])"
 
 
 def _held(text: str) -> Markup:
-    """A sentence whose numbers keep to their symbols and units where a line ends."""
-    return Markup(re.sub(_TOGETHER, "&nbsp;", str(Markup.escape(text))))
+    """A sentence whose numbers keep to their symbols and units where a line ends, and flags in one piece."""
+    held = re.sub(_TOGETHER, "&nbsp;", str(Markup.escape(text)))
+    return Markup(re.sub(r"(?<!\S)(--?[a-z][a-z-]*)", r'<span class="flag">\1</span>', held))
 
 
 def _digits(value: float | None, form: str = ".3g") -> str:

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fitmat.reports.rows import parameter_rows
-from fitmat.studies.cards import BAD, CAUTION, GOOD, UNKNOWN, cards, ordered
+from fitmat.studies.cards import BAD, CAUTION, GOOD, UNKNOWN, cards, ordered, wider
 from fitmat.text import visible, visible_in
 
 Record = Mapping[str, Any]
@@ -51,6 +51,8 @@ def show(record: Record, report: Path, screen: Console | None = None) -> None:
         if record["choice"] is not None:
             _say(out, f"\n{record['choice']['verdict']}")
     _doubts(out, record, shown)
+    if command := wider(record):
+        _say(out, f"\nEvery model: {command}")
     out.print(Text(f"\nReport: {visible(str(report))}"), soft_wrap=True)
 
 

@@ -4,12 +4,13 @@ They read the record and decide nothing that a named threshold does not; page an
 """
 
 import dataclasses
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from fitmat.colour.differences import CLEARLY_VISIBLE, JUST_NOTICEABLE
+from fitmat.colour.differences import CLEARLY_VISIBLE, JUST_NOTICEABLE, seen
 from fitmat.fitting.quantities import UNDETERMINED
 from fitmat.match.distances import WITHIN
 from fitmat.match.regions import GRAZING_DEG
@@ -134,12 +135,14 @@ def _phong(record: Record) -> Card:
 
 
 def _standing_in(match: Record, one: str, other: str, question: str) -> Card:
-    eye, seen, apart = "", match["perceived"], match["measured_distance"]
+    eye, worst, perceived, apart = "", "", match["perceived"], match["measured_distance"]
     limit = (apart["ci95"] or [apart["value"]] * 2)[1]
     hardly = limit < CLOSE
-    if seen is not None:
-        delta = seen["delta_e_2000"]
-        eye = f"ΔE2000 {delta['mean']['value']:.1f} on average"
+    if perceived is not None:
+        delta = perceived["delta_e_2000"]
+        eye = _seen("mean ΔE2000 {:.1f}", delta["mean"]["value"])
+        if delta["mean"]["value"] < JUST_NOTICEABLE <= delta["worst_twentieth"]["value"]:
+            worst = _seen("ΔE2000 {:.1f} where worst", delta["worst_twentieth"]["value"])
         hardly = delta["worst_twentieth"]["ci95"][1] < CLEARLY_VISIBLE
         hardly &= delta["mean"]["value"] < JUST_NOTICEABLE or apart["value"] < SIMILAR
     if hardly:
@@ -147,21 +150,27 @@ def _standing_in(match: Record, one: str, other: str, question: str) -> Card:
             f"{one} serves: an eye would hardly tell it from {other}" if eye else f"{one} hardly differs from {other}"
         )
         return Card(question, GOOD, "serves", f"{words}{f' ({eye})' if eye else ''}.")
+    eye = worst or eye
     upto = match["serves_up_to_deg"]
     if upto is not None and upto >= SERVES_FROM_DEG:
         beyond = "" if upto <= match["measured_deg"][1] + np.rad2deg(WITHIN) else ", extrapolated"
         words = f"{one} serves up to {upto:.0f}° of incidence{beyond}, within {100 * SIMILAR:.0f} % of {other}"
         return Card(question, CAUTION, f"up to {upto:.0f}° of incidence", f"{words}; {eye or 'beyond, it breaks'}.")
     shares = {region: e["value"] for region, e in match["distances"]["relative"]["share"].items()}
-    worst = max(shares, key=lambda region: shares[region] or 0.0)
-    where = f"{100 * (shares[worst] or 0.0):.0f} % of the difference to {other} lies {PLACES[worst]}"
+    place = max(shares, key=lambda region: shares[region] or 0.0)
+    share = f"{100 * (shares[place] or 0.0):.0f} %"
+    where = f"over the hemisphere, {share} of the difference to {other} lies {PLACES[place]}"
     return Card(question, BAD, "does not serve", f"{one} does not serve: {f'{eye}; ' if eye else ''}{where}.")
 
 
+def _seen(words: str, delta: float) -> str:
+    return f"{words.format(delta)}, {seen(delta)}"
+
+
 PLACES = {
-    "core": "in the core of the highlight",
-    "tail": "in the tail of the highlight",
-    "grazing": f"at grazing angles, beyond {GRAZING_DEG:.0f}°",
+    "core": "in the highlight's core",
+    "tail": "in the highlight's tail",
+    "grazing": f"beyond {GRAZING_DEG:.0f}°",
     "diffuse": "far from the highlight",
 }
 """Region of `match.regions` → where that is."""
@@ -175,6 +184,17 @@ def next_angle(record: Record) -> str:
     turned = f" turned {place['phi_i_deg']:.3g}°" if place["phi_i_deg"] else ""
     across = " across the plane" if place["phi_deg"] < ACROSS_DEG else ""
     return f"incidence {place['theta_i_deg']:.3g}°{turned}{across}"
+
+
+def wider(record: Record) -> str:
+    """The command that tries every model, where the best of a few misses the data; "" where none is known."""
+    fit, command = best(record), record.get("command")
+    if command is None or fit is None or not fit["inadequate"] or len(record["fits"]) > FEW:
+        return ""
+    words = shlex.split(command)
+    names = [k for k, word in enumerate(words) if word == "--models"]
+    kept = [word for k, word in enumerate(words) if k not in names and k - 1 not in names]
+    return shlex.join([*(word for word in kept if not word.startswith("--models=")), "--models", "all"])
 
 
 def _trust(record: Record) -> Card:
@@ -193,7 +213,7 @@ def _trust(record: Record) -> Card:
         words = f"In part: {name} is a single best fit under the loss {record['loss']['name']}, without intervals."
         return Card(question, CAUTION, "no intervals", words)
     if misses:
-        others = "; try --models all" if len(record["fits"]) <= FEW else ""
+        others = "; try more models" if len(record["fits"]) <= FEW else ""
         words = f"With care: {misses}; the intervals allow for that{others}."
         if lost := fit["not_determined"]:
             words = _within(lost, lambda few, verb: f"With care: {misses}, and {few} {verb} not determined{others}.")

@@ -116,3 +116,16 @@ def test_what_no_light_can_be_has_a_finite_difference() -> None:
     assert (lms.min(axis=1) < 0.0).all()
     found = delta_e_itp(imaginary, np.tile(WHITE, (2, 1)))
     assert np.all((found > 1.0) & (found < 720.0 * np.sqrt(1.0 + 1.7**2 + 4.4**2)))
+
+
+def test_words_for_what_an_eye_sees_are_those_of_mokrzycki_and_tatol() -> None:
+    """Not noticed below 1, by the experienced below 2, by others below 3.5, clear below 5, then two colours."""
+    said = (
+        "not visible",
+        "for trained eyes",
+        "just visible",
+        "clearly visible",
+        "different colours",
+        "different colours",
+    )
+    assert tuple(map(differences.seen, (0.99, 1.0, 2.0, 3.5, 5.0, np.inf))) == said

@@ -14,7 +14,7 @@ from fitmat.measurements.parsing import blocks
 from fitmat.measurements.samples import Measurements
 
 ALBEDO = 0.4
-ALARM = "total integrated scatter"
+ALARM = "scattered in all (TIS)"
 
 
 def zemax_file(folder: Path, tis: list[float], *, theta_i: tuple[float, ...] = (20.0, 50.0)) -> Path:
@@ -46,7 +46,7 @@ def test_a_sum_that_is_right_raises_no_alarm(tmp_path: Path) -> None:
 def test_another_sum_is_said_where_it_is(tmp_path: Path, wrong: float) -> None:
     """Of a Lambertian surface the integral without the cosine is 2a; some writers put 1 where they know nothing."""
     found = examine(fm.read(zemax_file(tmp_path, [ALBEDO, wrong])))
-    assert re.search(rf"{wrong:.3g} at 50°, where they add up to 0\.4\d*", alarm(found))
+    assert re.search(rf"at 50° it says {wrong:.3g}, and they add up to 0\.4\d*", alarm(found))
     assert "at 20°" not in alarm(found)
     first = found.as_dict()["channels"]["value"]["implied_albedo"]
     assert [round(entry["stated"], 5) for entry in first] == [ALBEDO, round(wrong, 5)]
@@ -81,7 +81,7 @@ def test_lighttools_states_it_block_by_block(tmp_path: Path) -> None:
     path.write_text(head + "DataBegin\n" + "".join(block.format(*words) + rows for words in said) + "DataEnd\n")
     found = examine(fm.read(path))
     assert found.albedos[0].stated.tolist() == [ALBEDO, 2 * ALBEDO, ALBEDO]
-    assert "0.8 at 30° in channel y, where they add up to 0.4" in alarm(found)
+    assert "at 30° in channel y it says 0.8, and they add up to 0.4" in alarm(found)
 
 
 def test_a_study_warns_of_it_too(tmp_path: Path) -> None:
@@ -95,6 +95,6 @@ def test_a_study_warns_of_it_too(tmp_path: Path) -> None:
 def test_a_file_of_ours_says_its_own_sum(shared_data: Path, tmp_path: Path) -> None:
     """The published file states another one than its values have (0.039 for 0.052 ± 0.002); written anew, theirs."""
     m = fm.read(shared_data / "ua-loft/zemax/AnoBlackEC1onAlum.bsdf")
-    assert "0.0387 at 10°, where they add up to 0.051" in alarm(examine(m))
+    assert "at 10° it says 0.0387, and they add up to 0.051" in alarm(examine(m))
     (tmp_path / "again.bsdf").write_text(zemax.dump(m), encoding="utf-8")
     assert alarm(examine(fm.read(tmp_path / "again.bsdf"))) == ""

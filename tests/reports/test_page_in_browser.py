@@ -180,6 +180,27 @@ def test_what_is_touched_changes_what_it_should(studied, chromium, monkeypatch) 
     assert (seen["reachable"], seen["nameless"]) == (0, 0)
 
 
+TOLD_APART = """
+  const models = fitmat.data.figures.models;
+  seen.dashes = models.map(name => String(fitmat.modelDash(name)));
+  seen.keys = every("#curve-controls .key").map(key => getComputedStyle(key).backgroundImage.includes("transparent")
+    || getComputedStyle(key).backgroundImage.includes("rgba(0, 0, 0, 0)"));
+  seen.printed = getComputedStyle(document.querySelector(".legend.printed")).display;
+  seen.named = document.querySelector(".legend.printed").textContent;
+"""
+
+
+@pytest.mark.study
+def test_models_differ_in_more_than_colour(studied, chromium, monkeypatch) -> None:
+    """In the dash of their lines, in charts and legends; on paper, where the controls are not, a legend names them."""
+    seen = look(html_of(studied), chromium, TOLD_APART, monkeypatch, "--window-size=1280,900")
+    assert seen["wrong"] == []
+    assert len(set(seen["dashes"])) == len(NAMES)
+    assert seen["keys"] == [True, False]
+    assert seen["printed"] == "none"
+    assert all(name in seen["named"] for name in (*NAMES, "measured"))
+
+
 @pytest.mark.study
 def test_planted_scripts_do_not_run(studied, chromium, monkeypatch) -> None:
     """In the names of the file, of channels and of models' words, which all reach charts and texts."""

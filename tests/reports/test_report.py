@@ -441,3 +441,25 @@ def test_templates_have_no_arithmetic_but_percent(file):
     for expression in re.findall(r"{{(.*?)}}", file.read_text(encoding="utf-8")):
         left = re.sub(r'"[^"]*"', "", expression).replace("factor * ", "").replace("(u / line[]) ** 2", "")
         assert not re.search(r"[^\w'.]\s*[*/]\s|\*\*", left), expression
+
+
+def test_the_command_that_tries_every_model_can_be_copied(studied: Study) -> None:
+    """Whole, as a reader of the page was not there when it was made; none where the model follows the data."""
+    found, drawn = record.to_dict(studied, "fitmat fit 'my paint.csv' --models ggx --seed 3"), figured(studied)
+    assert "The command that tries every model" not in rendering.to_html(found, drawn)
+    for fit in found["fits"]:
+        fit["inadequate"] = True
+    page_ = rendering.to_html(found, drawn)
+    snippet = re.search(r'aria-label="The command that tries every model">([^<]*)</pre><button[^>]*>Copy', page_)
+    assert snippet is not None
+    assert html.unescape(snippet[1]) == "fitmat fit 'my paint.csv' --seed 3 --models all"
+
+
+def test_bars_of_the_first_screen_have_numbers(studied: Study, report: str) -> None:
+    """The limits of each interval beside its bar."""
+    first = report.partition('<table class="mini">')[2].partition("</table>")[0]
+    rows = [
+        row for row in parameter_rows(record.to_dict(studied)["fits"][1], ["r", "g", "b"]) if row["kind"] == "fitted"
+    ]
+    assert first.count("<svg") == first.count(" – ") > 2
+    assert sum(row["interval"] in first for row in rows) >= first.count("<svg")

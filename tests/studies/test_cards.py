@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from fitmat.studies.cards import BAD, CAUTION, GOOD, MOST_WORDS, UNKNOWN, Card, cards
+from fitmat.studies.cards import BAD, CAUTION, GOOD, MOST_WORDS, UNKNOWN, Card, cards, wider
 
 
 def quantity(value: Any, sd: Any = 0.001, remark: Any = "") -> dict[str, Any]:
@@ -66,8 +66,8 @@ def test_a_plastic_is_told_in_three_sentences() -> None:
     material, phong, trust = cards(record())
     assert material.sentence == "Like satin plastic: diffuse 20 %, F0 4.0 %, α 0.1500 ± 0.0004 (GGX)."
     assert phong.sentence == (
-        "Blinn–Phong does not serve: ΔE2000 5.3 on average; "
-        "97 % of the difference to GGX lies at grazing angles, beyond 70°."
+        "Blinn–Phong does not serve: mean ΔE2000 5.3, different colours; "
+        "over the hemisphere, 97 % of the difference to GGX lies beyond 70°."
     )
     assert trust.sentence == (
         "Yes: GGX follows the data within the noise and every parameter is determined; no further angle is needed."
@@ -125,18 +125,30 @@ def test_a_material_is_called_what_its_numbers_are(parameters: Any, derived: Any
 @pytest.mark.parametrize(
     ("changes", "level", "words"),
     [
-        ({"perceived": {"delta_e_2000": spread(0.6, 2.0, 2.9)}}, GOOD, "serves: an eye would hardly tell it from GGX"),
-        ({"perceived": {"delta_e_2000": spread(0.6, 2.0, 3.1)}}, BAD, "does not serve: ΔE2000 0.6"),
+        (
+            {"perceived": {"delta_e_2000": spread(0.6, 2.0, 2.9)}},
+            GOOD,
+            "tell it from GGX (mean ΔE2000 0.6, not visible).",
+        ),
+        (
+            {"perceived": {"delta_e_2000": spread(0.6, 2.0, 3.1)}},
+            BAD,
+            "does not serve: ΔE2000 2.0 where worst, just visible; over",
+        ),
         (
             {"perceived": None, "measured_distance": {"value": 0.08, "ci95": [0.07, 0.099]}},
             GOOD,
             "hardly differs from GGX.",
         ),
-        ({"perceived": None, "measured_distance": {"value": 0.08, "ci95": [0.07, 0.11]}}, BAD, "does not serve: 97 %"),
+        (
+            {"perceived": None, "measured_distance": {"value": 0.08, "ci95": [0.07, 0.11]}},
+            BAD,
+            "does not serve: over the hemisphere, 97 %",
+        ),
         (
             {"serves_up_to_deg": 60.0},
             CAUTION,
-            "serves up to 60° of incidence, within 30 % of GGX; ΔE2000 5.3 on",
+            "serves up to 60° of incidence, within 30 % of GGX; mean ΔE2000 5.3, different colours.",
         ),
         ({"serves_up_to_deg": 85.0}, CAUTION, "serves up to 85° of incidence, extrapolated, within 30 % of GGX"),
         ({"serves_up_to_deg": 15.0}, BAD, "does not serve"),
@@ -173,7 +185,7 @@ def test_phong_serves_where_the_data_prefer_it() -> None:
         (
             {"inadequate": True, "misfit_ratio": 8.0, "doubts": ["a"], "not_determined": list("abcd")},
             CAUTION,
-            "by 8 × the noise, and a, b, c and 1 more are not determined; try --models all.",
+            "by 8 × the noise, and a, b, c and 1 more are not determined; try more models.",
         ),
         ({"inadequate": True, "intervals_hold": False, "doubts": ["a"]}, BAD, "No: "),
         ({"not_determined": ["eta", "ks"]}, CAUTION, "In part: eta, ks are not determined by these angles; `"),
@@ -259,3 +271,21 @@ def test_a_word_above_its_sentence_is_not_said_twice() -> None:
     assert said.after_word == "GGX follows the data within the noise."
     other = Card("Phong or not", BAD, "does not serve", "Blinn–Phong does not serve: ΔE2000 5.3 on average.")
     assert other.after_word == other.sentence
+
+
+@pytest.mark.parametrize(
+    ("command", "every"),
+    [
+        ("fitmat fit a.csv", "fitmat fit a.csv --models all"),
+        ("fitmat fit 'a b.csv' --models ggx,phong --seed 3", "fitmat fit 'a b.csv' --seed 3 --models all"),
+        ("fitmat fit --models=ggx a.csv", "fitmat fit a.csv --models all"),
+        (None, ""),
+    ],
+)
+def test_what_tries_every_model_is_a_whole_command(command: str | None, every: str) -> None:
+    missing = {"inadequate": True, "misfit_ratio": 8.0}
+    found = record(command=command, fits=[fitted("lambert+ggx", **missing)], choice=None, match=None)
+    assert wider(found) == every
+    assert wider(record(command=command)) == ""  # GGX, which stands for the material, follows the data
+    many = [fitted(name, **missing) for name in ("ggx", "ward", "phong")]
+    assert wider(record(command=command, fits=many, choice=None, match=None)) == ""

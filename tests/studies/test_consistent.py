@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import fitmat as fm
+from fitmat.colour.differences import seen
 from fitmat.fitting.quantities import UNDETERMINED
 from fitmat.reports.rows import parameter_rows
 from fitmat.studies import record
@@ -136,9 +137,11 @@ def _served(found: Study, phong: Card) -> Iterator[str]:
     if phong.word == "does not serve" and apart[:5].max() < 0.3:
         yield f"{phong.sentence} though within {apart[:5]} up to 20°"
     if "ΔE2000" in phong.sentence and match.perceived is not None:
-        value = match.perceived.delta_e_2000.mean.value
-        if f"ΔE2000 {value:.1f} on average" not in phong.sentence:
-            yield f"{phong.sentence} with ΔE2000 {value}"
+        delta = match.perceived.delta_e_2000
+        mean, worst = delta.mean.value, delta.worst_twentieth.value
+        said = f"mean ΔE2000 {mean:.1f}, {seen(mean)}", f"ΔE2000 {worst:.1f} where worst, {seen(worst)}"
+        if said["worst" in phong.sentence] not in phong.sentence:
+            yield f"{phong.sentence} with ΔE2000 {mean}, {worst}"
 
 
 TRUTHS = [

@@ -59,11 +59,11 @@ def _contradictions(found: Sequence[ImpliedAlbedo], channels: Sequence[str]) -> 
         k = int(np.nanargmax(np.where(a.contradicted, np.abs(a.value - a.stated), -np.inf)))
         where = f" in {say.channels(channels[k : k + 1])}" if len(channels) > 1 else ""
         added = with_error(float(a.value[k]), float(a.error[k]))
-        parts.append(f"{a.stated[k]:.3g} at {say.degrees(a.theta_i)}{where}, where they add up to {added}")
+        parts.append(f"at {say.degrees(a.theta_i)}{where} it says {a.stated[k]:.3g}, and they add up to {added}")
     yield (
-        f"The file's own total integrated scatter (TIS) is not that of its values: {'; '.join(parts)}"
-        f"{_as_round(doubted[0]) if all(a.assumed for a in doubted) else ''}. Is it of another "
-        "quantity, as one without the cosine, or of other values?"
+        "The file states how much of the light is scattered in all (TIS), and its values add up to something else: "
+        f"{'; '.join(parts)}{_as_round(doubted[0]) if all(a.assumed for a in doubted) else ''}. "
+        "Is the cosine missing in one of them, or was the TIS taken from other values?"
     )
 
 

@@ -12,6 +12,16 @@ const fitmat = (() => {
   const colour = name => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
   const modelColour = name => colour("model" + Math.max(data.figures.models.indexOf(name), 0) % 4);
 
+  const dashes = [[9, 4], undefined, [11, 3, 2, 3], [3, 3]];  // as in page.css
+  const modelDash = name => dashes[Math.max(data.figures.models.indexOf(name), 0) % 4];
+
+  /* A piece of a line, for a legend; the colour as CSS has it. */
+  function key(colour, dash) {
+    let at = 0;
+    const parts = (dash || [24]).map((length, k) => `${k % 2 ? "transparent" : colour} ${at}px ${at += length}px`);
+    return element("span", {className: "key", style: `background:repeating-linear-gradient(90deg,${parts.join(",")})`, ariaHidden: "true"});
+  }
+
   function element(tag, attributes = {}, ...children) {
     const made = document.createElement(tag);
     for (const [key, value] of Object.entries(attributes)) {
@@ -54,5 +64,5 @@ const fitmat = (() => {
     waiting = setTimeout(again, 120);
   });
 
-  return {data, state, colour, modelColour, element, number, fitOf, part, redraw};
+  return {data, state, colour, modelColour, modelDash, key, element, number, fitOf, part, redraw};
 })();

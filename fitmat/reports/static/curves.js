@@ -23,9 +23,9 @@ fitmat.part("panels", (place, {figures}) => {
     const choice = (legend, name, options, chosen, pick) => element("fieldset", {}, element("legend", {textContent: legend}),
       ...options.map((text, k) => element("label", {}, element("input", {type: "radio", name, checked: text === chosen || k === chosen, onchange: () => change(() => pick(text, k))}), text)));
     const tick = (text, on, pick, key) => element("label", {}, element("input", {type: "checkbox", checked: on, onchange: event => change(() => pick(event.target.checked))}),
-      ...(key ? [element("span", {className: "key " + key, ariaHidden: "true"})] : []), text);
+      ...(key ? [key] : []), text);
     bar.append(element("fieldset", {}, element("legend", {textContent: "models"}), ...figures.models.map((name, k) =>
-      tick(name, true, on => on ? state.models.add(name) : state.models.delete(name), "model" + k))));
+      tick(name, true, on => on ? state.models.add(name) : state.models.delete(name), fitmat.key(`var(--model${k % 4})`, fitmat.modelDash(name))))));
     bar.append(tick("95 % bands", true, on => { state.bands = on; }));
     bar.append(choice("scale", "scale", ["linear", "log", "cube root"], state.scale, text => { state.scale = text; }));
     bar.append(tick("one scale for all", true, on => { state.shared = on; }));
@@ -92,7 +92,7 @@ fitmat.part("panels", (place, {figures}) => {
     }
     const series = names.map(name => {
       const m = c.models[name], band = state.bands && used.length > 1, inside = used.map(i => c.theta_o[i]);
-      return {values: x.map(v => along(m.theta_o, m.value[k], v)), colour: fitmat.modelColour(name),
+      return {values: x.map(v => along(m.theta_o, m.value[k], v)), colour: fitmat.modelColour(name), dash: fitmat.modelDash(name),
               outlined: fitmat.fitOf(name).inadequate,
               low: band ? x.map(v => along(inside, used.map(i => m.low[k][i]), v, true)) : null,
               high: band ? x.map(v => along(inside, used.map(i => m.high[k][i]), v, true)) : null};

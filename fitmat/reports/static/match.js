@@ -12,7 +12,7 @@ fitmat.part("albedo", (place, {figures, record}) => {
     place.replaceChildren();
     beside.replaceChildren();
     const pair = [[m.empirical, m.albedo.empirical], [m.microfacet, m.albedo.microfacet]];
-    const albedo = pair.map(([name, rows]) => ({label: name, values: rows[1], low: rows[0], high: rows[2], colour: fitmat.modelColour(name), outlined: fitmat.fitOf(name).inadequate}));
+    const albedo = pair.map(([name, rows]) => ({label: name, values: rows[1], low: rows[0], high: rows[2], colour: fitmat.modelColour(name), dash: fitmat.modelDash(name), outlined: fitmat.fitOf(name).inadequate}));
     const regions = {core: [4, 3], tail: [8, 3], grazing: [1, 3], diffuse: [8, 3, 2, 3]};
     const lines = Object.entries(m.by_region).map(([name, rows], k) => ({label: name, values: rows[1], colour: fitmat.colour("model" + k), width: 1.5, dash: regions[name]}));
     lines.push({label: "all directions", values: m.distance[1], low: m.distance[0], high: m.distance[2], colour: fitmat.colour("measured")});
@@ -31,9 +31,9 @@ fitmat.part("albedo", (place, {figures, record}) => {
     where.append(box, legend);
     const tell = x => {
       const i = m.theta_i.reduce((best, v, k) => Math.abs(v - x) < Math.abs(m.theta_i[best] - x) ? k : best, 0);
-      legend.replaceChildren(...[`θᵢ ${number(m.theta_i[i])}°: `, ...series.flatMap((s, k) => [...(k ? [" · "] : []), key(s), ` ${s.label} ${number(s.values[i], 3)}`])]);
+      legend.replaceChildren(...[`θᵢ ${number(m.theta_i[i])}°: `, ...series.flatMap((s, k) => [...(k ? [" · "] : []), fitmat.key(s.colour, s.dash), ` ${s.label} ${number(s.values[i], 3)}`])]);
     };
-    legend.replaceChildren(...series.flatMap((s, k) => [...(k ? [" · "] : []), key(s), ` ${s.label}`]));
+    legend.replaceChildren(...series.flatMap((s, k) => [...(k ? [" · "] : []), fitmat.key(s.colour, s.dash), ` ${s.label}`]));
     const chart = fitmat.chart(box, {x: m.theta_i, series, xRange: [0, 90], yRange: [0, top], xLabel: "incidence θᵢ", yLabel, shades, marks, label, at: tell, height: 270});
     let at = -1;
     box.addEventListener("keydown", event => {
@@ -44,9 +44,5 @@ fitmat.part("albedo", (place, {figures, record}) => {
       event.preventDefault();
     });
     return chart;
-  }
-
-  function key(s) {
-    return fitmat.element("span", {className: "key", style: `border-top-color:${s.colour};border-top-style:${s.dash ? "dashed" : "solid"}`, ariaHidden: "true"});
   }
 });
