@@ -7,8 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
+from fitmat.fitting.channelwise import layout
 from fitmat.fitting.coordinates import Coordinates, coordinates
 from fitmat.fitting.likelihood import Data, every_residual, misfits
+from fitmat.maths.grams import Layout
 from fitmat.maths.least_squares import normal_equations
 from fitmat.maths.mapping import mapped
 from fitmat.maths.programs import program
@@ -42,10 +44,11 @@ def normal_equations_at(
         s: Discrepancy.
     """
     every, found = coordinates(template), []
+    of = layout(template, every, data.x.shape[1])
     for part in slices(len(points), AT_ONCE):
         size = part.stop - part.start
         filled = np.concatenate([points[part], np.repeat(points[part][:1], AT_ONCE - size, axis=0)])
-        some = _normal_equations(template, data, filled, np.asarray(float(s)), np.array(size), every)
+        some = _normal_equations(template, data, filled, np.asarray(float(s)), np.array(size), every, of)
         found.append([np.asarray(one)[:size] for one in some])
     square, slope, gram = (np.concatenate(one) for one in zip(*found, strict=True))
     return square, slope, gram
@@ -53,13 +56,21 @@ def normal_equations_at(
 
 @program
 def _normal_equations(
-    template: AbstractBRDF, data: Data, points: ArrayLike, s: ArrayLike, count: ArrayLike, every: Coordinates
+    template: AbstractBRDF,
+    data: Data,
+    points: ArrayLike,
+    s: ArrayLike,
+    count: ArrayLike,
+    every: Coordinates,
+    of: Layout | None,
 ) -> tuple[Array, Array, Array]:
     base = vector(template)
 
     def one(t: Array) -> tuple[Array, Array, Array]:
-        found = normal_equations(lambda at: every_residual(every.model(template, base, at), data, jnp.asarray(s)), t)
-        return found.square, found.slope, found.gram
+        found = normal_equations(
+            lambda at: every_residual(every.model(template, base, at), data, jnp.asarray(s)), t, of
+        )
+        return found.square, found.slope, found.gram.dense()
 
     return mapped(one, jnp.asarray(points), count)
 

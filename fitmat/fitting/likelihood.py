@@ -21,8 +21,9 @@ from jaxtyping import Array, Float
 from fitmat._types import Samples, Scalar
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.losses import DEFAULT, Loss
-from fitmat.fitting.stabilising import spread
+from fitmat.fitting.stabilising import along_discrepancy, two_thirds
 from fitmat.maths.arrays import library
+from fitmat.maths.least_squares import Residuals
 from fitmat.measurements.horizon import with_horizon
 from fitmat.measurements.noise import Noise, levels
 from fitmat.measurements.samples import Measurements
@@ -46,6 +47,10 @@ class Prior(eqx.Module):
     mean: Any
     precision: Any
     discrepancy: Any
+
+    def of(self, places: np.ndarray) -> "Prior":
+        """That of some of the parameters."""
+        return Prior(self.mean[places], self.precision[places], self.discrepancy)
 
 
 class Data(eqx.Module):
@@ -88,6 +93,15 @@ class Data(eqx.Module):
         wi, wo, x, noise, kappa, weight = (part[::stride] for part in arrays)
         level, jitter = (None if part is None else part[::stride] for part in (self.level, self.jitter))
         return Data(wi, wo, x, noise, kappa, weight, self.prior, self.loss, level, self.typical, jitter)
+
+    def of_channels(self, which: np.ndarray, places: np.ndarray) -> "Data":
+        """Some of the channels; `places` are those of their parameters in the vector of all."""
+        x, noise, weight, level, jitter = (
+            None if part is None else part[:, which]
+            for part in (self.x, self.noise, self.weight, self.level, self.jitter)
+        )
+        known = None if self.prior is None else self.prior.of(places)
+        return dataclasses.replace(self, x=x, noise=noise, weight=weight, level=level, jitter=jitter, prior=known)
 
     def under(self, loss: Loss) -> "Data":
         """The same samples under another loss and a flat prior."""
@@ -176,9 +190,7 @@ def _level(data: Data) -> Samples:
 
 
 def _spread_residuals(model: AbstractBRDF, data: Data) -> Samples:
-    """√(2 ln(σ/σ_least)), (n, c), whose half squares sum to the ln σ of the density; empty where σ is given."""
-    if not data.loss.infers_noise:
-        return jnp.zeros((0, 1))
+    """√(2 ln(σ/σ_least)), (n, c), whose half squares sum to the ln σ of the density."""
     assert isinstance(model, Noisy)
     level = _level(data)
     return data.weight * jnp.sqrt(2.0 * jnp.log(model.sigma(level) / model.least_sigma(level)))
@@ -192,9 +204,14 @@ def prior_residuals(model: AbstractBRDF, data: Data) -> Float[Array, " p"]:
 
 
 def every_residual(
-    model: AbstractBRDF, data: Data, s: Scalar, measured: Samples | None = None, x: Samples | None = None
-) -> Float[Array, " r"]:
-    """`residuals`, what an inferred noise adds, and `prior_residuals` as one vector, what least squares minimises.
+    model: AbstractBRDF,
+    data: Data,
+    s: Scalar,
+    measured: Samples | None = None,
+    x: Samples | None = None,
+    free: np.ndarray | None = None,
+) -> Residuals:
+    """`residuals`, below them what an inferred noise adds, and `prior_residuals`: what least squares minimises.
 
     Args:
         model: Where to evaluate.
@@ -202,12 +219,13 @@ def every_residual(
         s: Discrepancy.
         measured: T(y κ), for loops in which s stays.
         x: `predicted`, where it is at hand.
+        free: Places of the parameters that are moved, of which alone there is a prior; None for all.
     """
     measured = transformed(data, s) if measured is None else measured
-    samples = residuals_from(measured, model, data, s, x).ravel()
-    beside = [_spread_residuals(model, data).ravel()] if data.loss.infers_noise else []
-    known = [] if data.prior is None else [prior_residuals(model, data)]
-    return jnp.concatenate([samples, *beside, *known]) if beside or known else samples
+    samples, known = residuals_from(measured, model, data, s, x), prior_residuals(model, data)
+    if data.loss.infers_noise:
+        samples = jnp.concatenate([samples, _spread_residuals(model, data)])
+    return Residuals(samples, known if data.prior is None or free is None else known[free])
 
 
 def log_density(model: AbstractBRDF, data: Data, s: Scalar, x: Samples | None = None) -> Scalar:
@@ -261,17 +279,23 @@ def best_discrepancy(x: Any, data: Any, start: Any, total: Total = jnp.vdot, mos
     if not data.loss.infers_discrepancy:
         return jnp.zeros(())
 
-    def cost(t: Scalar) -> Scalar:
-        s = jnp.exp(t)
-        r = data.loss.shrink(transformed(data, s) - data.loss.transform(x, data.noise, data.kappa, s))
-        logs = jnp.log(spread(data.x, data.noise, s))
-        return total(data.weight, 0.5 * r**2 + logs) + discrepancy_cost(data, s)
+    powers, floor = (two_thirds(data.x), two_thirds(x)), jnp.log(NEGLIGIBLE * data.typical)
 
-    one, floor = jnp.ones(jnp.shape(start)), jnp.log(NEGLIGIBLE * data.typical)
+    def slopes(t: Scalar) -> tuple[Scalar, Scalar]:
+        """Of ½ Σ residual² + Σ ln(a + d), first and second."""
+        s = jnp.exp(t)
+        z, change, bend, share = along_discrepancy(data.x, data.noise, s, powers[0])
+        other, other_change, other_bend, _ = along_discrepancy(x, data.noise, s, powers[1])
+        change, bend = change - other_change, bend - other_bend
+        pull, pull_change = _pull(z - other, data.loss)
+        known = jnp.zeros(()) if data.prior is None else (data.prior.discrepancy * s) ** 2
+        first = total(data.weight, pull * change + share) + known
+        second = pull_change * change**2 + pull * bend + share * (1.0 - share)
+        return first, total(data.weight, second) + 2.0 * known
 
     def step(state: tuple[Scalar, Scalar, Array]) -> tuple[Scalar, Scalar, Array]:
         t, _, count = state
-        g, curvature = jax.jvp(lambda t: jax.jvp(cost, (t,), (one,))[1], (t,), (one,))
+        g, curvature = slopes(t)
         newton = jnp.clip(-g / jnp.maximum(jnp.abs(curvature), 1e-3), -2.0, 2.0)
         moved = jnp.clip(t + newton, floor, floor + 40.0)
         return moved, jnp.abs(moved - t), count + 1
@@ -281,8 +305,18 @@ def best_discrepancy(x: Any, data: Any, start: Any, total: Total = jnp.vdot, mos
     def moves(state: tuple[Scalar, Scalar, Array]) -> Array:
         return jnp.any(state[1] > STILL) & (state[2] < most)
 
-    t, _, _ = jax.lax.while_loop(moves, step, (begin, one, jnp.array(0)))
+    t, _, _ = jax.lax.while_loop(moves, step, (begin, jnp.ones(jnp.shape(start)), jnp.array(0)))
     return jnp.where(t > floor + 1e-6, jnp.exp(t), 0.0)
+
+
+def _pull(r: Samples, loss: Loss) -> tuple[Samples, Samples]:
+    """The first two derivatives of ½ shrink(r)²."""
+    one = jnp.ones_like(r)
+
+    def half(r: Samples) -> Samples:
+        return 0.5 * loss.shrink(r) ** 2
+
+    return jax.jvp(lambda r: jax.jvp(half, (r,), (one,))[1], (r,), (one,))
 
 
 NEGLIGIBLE = 1e-3

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
+from fitmat.fitting.channelwise import layout
 from fitmat.fitting.coordinates import Coordinates
 from fitmat.fitting.likelihood import Data, inferred_noise, misfits
 from fitmat.models.base import AbstractBRDF
@@ -16,6 +17,9 @@ from fitmat.models.values import values
 
 ROWS = 4096
 """Of more rows an evenly spread part stands for all."""
+
+MOST = 50_000_000
+"""Slopes that are held; where there would be more, of hundreds of channels, fewer rows stand for all."""
 
 STEP = 1e-3
 """Of the differences that give the slopes, in standard deviations."""
@@ -68,7 +72,7 @@ def linearise(
         return None
     bounded = np.where(data.told(moved.index[inside]), 0.0, 12.0 / moved.extent[inside] ** 2)
     known, h = _known(information[np.ix_(*2 * (moved.index[inside],))], bounded)
-    data = data.every(-(-len(data.x) // ROWS))
+    data = data.every(-(-len(data.x) // max(1, min(ROWS, MOST // (data.x.shape[1] * len(inside))))))
     r, slopes = _linearised(best, data, s, moved, inside, STEP / np.sqrt(np.diagonal(known)))
     used = np.asarray(data.weight) > 0
     slopes = np.where(used[:, :, None], slopes, 0.0)
@@ -89,20 +93,53 @@ def _known(
 def _linearised(
     best: AbstractBRDF, data: Data, s: float, moved: Coordinates, inside: np.ndarray, step: np.ndarray
 ) -> tuple[Float[np.ndarray, "n c"], Float[np.ndarray, "n c i"]]:
-    """Residuals at the optimum and their slopes along natural coordinates, by central differences."""
-    centre, k = np.asarray(vector(best)), len(inside)
-    points = around(moved, centre, inside, step)
+    """Residuals at the optimum and their slopes along natural coordinates, by central differences.
+
+    Parameters that count in one channel each are moved together.
+    """
+    centre, together = np.asarray(vector(best)), _together(best, moved, inside, data.x.shape[1])
+    k = len(together)
+    points = around(moved, centre, inside, step, together)
     x = values(best, moved.filled(centre, points), data.wi, data.wo) * data.kappa
     noise = np.asarray(inferred_noise(best, data) if data.loss.infers_noise else data.noise)
     r = misfits(x, noise, data, np.asarray(s))
-    apart = points[np.arange(k), inside] - points[np.arange(k, 2 * k), inside]
-    return r[-1], np.moveaxis((r[k : 2 * k] - r[:k]) / apart[:, None, None], 0, -1)
+    slopes = np.zeros((*data.x.shape, len(inside)))
+    for row, (members, columns) in enumerate(together):
+        apart = points[row, inside[members]] - points[k + row, inside[members]]
+        found = r[k + row] - r[row]
+        if columns is None:
+            slopes[:, :, members[0]] = found / apart
+        else:
+            slopes[:, columns, members] = found[:, columns] / apart
+    return r[-1], slopes
+
+
+Together = list[tuple[np.ndarray, np.ndarray | None]]
+"""Positions among `inside`, and the channel of each; None where it counts in all."""
+
+
+def _together(best: AbstractBRDF, moved: Coordinates, inside: np.ndarray, channels: int) -> Together:
+    """Which parameters can be moved at once, since no channel sees more than one of them."""
+    of = layout(best, moved, channels)
+    if of is None:
+        return [(np.array([k]), None) for k in range(len(inside))]
+    at = {place: k for k, place in enumerate(inside.tolist())}
+    single: Together = [(np.array([at[place]]), None) for place in of.shared if place in at]
+    several = [[(at[place], channel) for channel, place in enumerate(row) if place in at] for row in of.own]
+    return single + [(np.array(row)[:, 0], np.array(row)[:, 1]) for row in several if row]
 
 
 def around(
-    moved: Coordinates, centre: Float[np.ndarray, " p"], inside: np.ndarray, step: Float[np.ndarray, " i"]
+    moved: Coordinates,
+    centre: Float[np.ndarray, " p"],
+    inside: np.ndarray,
+    step: Float[np.ndarray, " i"],
+    together: "Together | None" = None,
 ) -> Float[np.ndarray, "m k"]:
-    """Natural coordinates above and below a point along each of `inside`, and the point: 2 i + 1 rows."""
-    here, moves = moved.natural(centre), np.zeros((len(inside), moved.count))
-    moves[np.arange(len(inside)), inside] = np.minimum(step, 0.01 * moved.span[inside])
+    """Natural coordinates above and below a point along each of `inside`, or of `together`, and the point itself."""
+    groups = [np.array([k]) for k in range(len(inside))] if together is None else [members for members, _ in together]
+    here, moves = moved.natural(centre), np.zeros((len(groups), moved.count))
+    least = np.minimum(step, 0.01 * moved.span[inside])
+    for row, members in zip(moves, groups, strict=True):
+        row[inside[members]] = least[members]
     return np.clip(np.concatenate([here + moves, here - moves, here[None]]), moved.low, moved.high)

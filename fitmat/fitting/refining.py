@@ -10,7 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike
 
-from fitmat.fitting.coordinates import Coordinates
+from fitmat.fitting.channelwise import Part, divides, layout
+from fitmat.fitting.coordinates import Coordinates, coordinates
 from fitmat.fitting.ends import AGREE, Ends, behind, home
 from fitmat.fitting.likelihood import (
     Data,
@@ -21,11 +22,12 @@ from fitmat.fitting.likelihood import (
     predicted,
     transformed,
 )
-from fitmat.maths.least_squares import least_squares
+from fitmat.maths.grams import Layout
+from fitmat.maths.least_squares import Residuals, least_squares
 from fitmat.maths.mapping import mapped
 from fitmat.maths.programs import program
 from fitmat.models.base import AbstractBRDF
-from fitmat.models.parameters import with_vector
+from fitmat.models.parameters import entries, with_vector
 
 STARTS = 6
 """How many of the best grid points are refined."""
@@ -88,7 +90,7 @@ def confirmed(
 def optima(
     template: AbstractBRDF, data: Data, starts: np.ndarray, moved: Coordinates, max_steps: int = MAX_STEPS
 ) -> Ends:
-    """Where the starts end, as `refine` has it; of many rows first on a part of them, then on all.
+    """Where the starts end, as `refine` has it; of many rows or channels first on a part of them, then on all.
 
     Args:
         template: Gives shapes, bounds and static choices.
@@ -97,17 +99,36 @@ def optima(
         moved: The parameters that are fitted.
         max_steps: Levenberg–Marquardt iterations per start.
     """
-    rows = data.x.shape[0]
-    if rows <= MANY_ROWS:
+    rows, channels = data.x.shape
+    if divides(template, channels):
+        coarse, damping = _of_some_channels(template, data, starts, moved, max_steps), 1.0
+    elif rows > MANY_ROWS:
+        part, damping = data.every(-(-rows // (MANY_ROWS // 2))), LITTLE_DAMPING
+        coarse = _refined(template, part, starts, first_discrepancy(part), moved, max_steps)
+    else:
         return _refined(template, data, starts, first_discrepancy(data), moved, max_steps)
-    part = data.every(-(-rows // (MANY_ROWS // 2)))
-    coarse = _refined(template, part, starts, first_discrepancy(part), moved, max_steps)
     which = _distinct(coarse, moved)
     distinct = np.unique(which)
     begin = max(float(coarse.discrepancy[distinct[0]]), 1e-2 * float(first_discrepancy(data)))
-    fine = _refined(template, data, coarse.values[distinct], np.asarray(begin), moved, max_steps, LITTLE_DAMPING)
+    fine = _refined(template, data, coarse.values[distinct], np.asarray(begin), moved, max_steps, damping)
     place = np.searchsorted(distinct, which)
     return Ends(*(column[place] for column in fine[:-1]), steps=fine.steps[place] + coarse.steps)
+
+
+def _of_some_channels(
+    template: AbstractBRDF, data: Data, starts: np.ndarray, moved: Coordinates, max_steps: int
+) -> Ends:
+    """Where the starts end on some of the channels, as parameters of all."""
+    part = Part(template, data.x.shape[1])
+    held = [e.name for e in entries(template) if e.place.start not in moved.places]
+    found = optima(
+        part.model,
+        data.of_channels(part.which, part.places),
+        starts[:, part.places],
+        coordinates(part.model, dict.fromkeys(held)),
+        max_steps,
+    )
+    return found._replace(values=part.spread(starts, found.values, moved.places))
 
 
 def _distinct(ends: Ends, moved: Coordinates) -> np.ndarray:
@@ -131,7 +152,7 @@ def _refined(
     count = len(starts)
     filled = np.concatenate([starts, np.repeat(starts[:1], STARTS - count, axis=0)])
     counts, scalars = np.array([count, max_steps]), np.array([first, damping])
-    found = refine(template, data, filled, counts, scalars, moved)
+    found = refine(template, data, filled, counts, scalars, moved, layout(template, moved, data.x.shape[1]))
     return Ends(*(np.asarray(part)[:count] for part in found))
 
 
@@ -143,6 +164,7 @@ def refine(
     counts: ArrayLike,
     scalars: ArrayLike,
     moved: Coordinates,
+    of: Layout | None,
 ) -> tuple[Array, Array, Array, Array, Array]:
     """Alternate Levenberg–Marquardt over the parameters and the best discrepancy, from every start.
 
@@ -155,6 +177,7 @@ def refine(
         counts: How many of the starts are refined, and how many iterations each may take.
         scalars: A first guess of the discrepancy, and of λ as `least_squares` has it.
         moved: The parameters that are fitted.
+        of: Which of them count in one channel; None where that is not known.
 
     Returns:
         The fields of `Ends`.
@@ -166,16 +189,17 @@ def refine(
         return with_vector(template, moved.from_unbounded(base, u))
 
     def one(base: Array) -> tuple[Array, ...]:
-        def residual(u: Array, args: tuple[Array, Array]) -> tuple[Array, Array]:
+        def residual(u: Array, args: tuple[Array, Array]) -> tuple[Residuals, Array]:
             model = at(base, u)
             x = predicted(model, data)
-            return every_residual(model, data, *args, x), x
+            return every_residual(model, data, *args, x, moved.index), x
 
         def body(state: _Stand) -> _Stand:
             s = state.discrepancy
             left = jnp.minimum(BURST, max_steps - state.steps)
             args = (s, transformed(data, s))
-            end = least_squares(residual, state.u, args, max_steps=left, damping=state.damping, bend=moved.bend)
+            told = {"layout": of, "max_steps": left, "damping": state.damping, "bend": moved.bend}
+            end = least_squares(residual, state.u, args, **told)
             updated = best_discrepancy(end.beside, data, s)
             settled = jnp.abs(updated - s) <= SETTLED * s
             ended, steady = settled & end.solved, settled & (end.offset < STEADY)

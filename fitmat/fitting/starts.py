@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from fitmat.fitting.channelwise import Part, divides
 from fitmat.fitting.likelihood import Data
 from fitmat.fitting.stabilising import spread, stabilised
 from fitmat.models.base import AbstractBRDF
@@ -29,6 +30,9 @@ MOST_NUMBERS = 4_000_000
 SWEEPS = 300
 """Coordinate-descent sweeps of the non-negative least squares; two lobes need far fewer."""
 
+MOST_TRIED = 3
+"""Weights of which every choice of those that are not 0 is tried."""
+
 STILL = 1e-12
 """Relative change of the weights at which the sweeps end."""
 
@@ -36,7 +40,7 @@ STILL = 1e-12
 def starting_points(
     model: AbstractBRDF, data: Data, s: np.ndarray, held: dict[str, np.ndarray], count: int
 ) -> Float[np.ndarray, "k p"]:
-    """The `count` best parameter vectors of the grid, best first.
+    """The `count` best parameter vectors of the grid, best first; of many channels, of some, and what lies between.
 
     Args:
         model: Gives the parameters, their grid values and their shapes; its values fill what the grid leaves open.
@@ -48,6 +52,8 @@ def starting_points(
     Returns:
         Physical parameter vectors; fewer than `count` rows where the grid is smaller.
     """
+    if divides(model, channels := data.x.shape[1]):
+        return _of_some(model, data, s, held, count, channels)
     free = [e for e in entries(model) if e.name not in held]
     grid = nodes(model, [e for e in free if not e.param.weight], held)
     weights = [e for e in free if e.param.weight]
@@ -59,6 +65,22 @@ def starting_points(
     ]
     solved, cost = (np.concatenate(part) for part in zip(*found, strict=True))
     return solved[np.argsort(np.nan_to_num(cost, nan=np.inf), kind="stable")[:count]]
+
+
+def _of_some(
+    model: AbstractBRDF, data: Data, s: np.ndarray, held: dict[str, np.ndarray], count: int, channels: int
+) -> Float[np.ndarray, "k p"]:
+    """The same by way of the starts of some channels."""
+    part = Part(model, channels)
+    few = {name: value if len(value) == 1 else value[part.which] for name, value in held.items()}
+    found = starting_points(part.model, data.of_channels(part.which, part.places), s, few, count)
+    base, free = np.array(vector(model), float), []
+    for entry in entries(model):
+        if entry.name in held:
+            base[entry.place] = held[entry.name]
+        else:
+            free.append(entry.place.start)
+    return part.spread(np.tile(base, (len(found), 1)), found, free)
 
 
 def nodes(model: AbstractBRDF, shapes: Sequence[Entry], held: Mapping[str, np.ndarray]) -> Float[np.ndarray, "k p"]:
@@ -160,15 +182,17 @@ def _weights(
 
 
 def nonnegative(gram: Float[np.ndarray, "... k k"], moment: Float[np.ndarray, "... k"]) -> Float[np.ndarray, "... k"]:
-    """The w ≥ 0 that minimises ½wᵀGw − mᵀw, by cyclic coordinate descent (Franc, Hlaváč & Navara 2005).
+    """The w ≥ 0 that minimises ½wᵀGw − mᵀw; of more than `MOST_TRIED` weights by cyclic coordinate descent.
 
-    Descent crawls where columns are almost alike: in the end the weights that are not 0 are solved for at once, and
-    that is taken where it is better.
+    Descent (Franc, Hlaváč & Navara 2005) crawls where columns are almost alike: in the end the weights that are not 0
+    are solved for at once, and that is taken where it is better.
 
     Args:
         gram: G = AᵀA, (…, k, k).
         moment: m = Aᵀb, (…, k).
     """
+    if moment.shape[-1] <= MOST_TRIED:
+        return _best_subset(gram, moment)
     diagonal = np.diagonal(gram, axis1=-2, axis2=-1)
     used = np.asarray(diagonal > 0)
     safe, w = np.where(used, diagonal, 1.0), np.zeros_like(moment)
@@ -179,18 +203,36 @@ def nonnegative(gram: Float[np.ndarray, "... k k"], moment: Float[np.ndarray, ".
             w[..., k] = np.where(used[..., k], np.maximum(best, 0.0), 0.0)
         if not (np.abs(w - before) > STILL * np.abs(w)).any():
             break
-    lit = np.asarray(w > 0)
-    among = lit[..., :, None] & lit[..., None, :]
     with np.errstate(all="ignore"):
-        # A ridge at the level of rounding: of columns that are alike any solution is one.
-        ridge = np.where(w > 0, 4.0 * np.finfo(float).eps * diagonal, 1.0)
-        system = np.where(among, gram, 0.0) + ridge[..., None] * np.eye(w.shape[-1])
-        solvable = np.asarray(np.isfinite(system).all(axis=(-2, -1)) & np.isfinite(moment).all(axis=-1))
-        system = np.where(solvable[..., None, None], system, np.eye(w.shape[-1]))
-        solved = np.linalg.solve(system, np.where(w > 0, moment, 0.0)[..., None])[..., 0]
-        better = np.isfinite(solved).all(axis=-1) & (solved >= 0).all(axis=-1)
-        better &= _cost(gram, moment, solved) < _cost(gram, moment, w)
+        solved = _solved(gram, moment, np.asarray(w > 0))
+        better = (solved >= 0).all(axis=-1) & (_cost(gram, moment, solved) < _cost(gram, moment, w))
     return np.where(better[..., None], solved, w)
+
+
+def _best_subset(gram: Float[np.ndarray, "... k k"], moment: Float[np.ndarray, "... k"]) -> Float[np.ndarray, "... k"]:
+    """The same of few weights: the best of all choices of which of them are not 0."""
+    used = np.diagonal(gram, axis1=-2, axis2=-1) > 0
+    found, least = np.zeros_like(moment), np.zeros(moment.shape[:-1])
+    with np.errstate(all="ignore"):
+        for lit in itertools.product((False, True), repeat=moment.shape[-1]):
+            solved = _solved(gram, moment, np.array(lit) & used)
+            cost = _cost(gram, moment, solved)
+            better = (solved >= 0).all(axis=-1) & (cost < least)
+            found, least = np.where(better[..., None], solved, found), np.where(better, cost, least)
+    return found
+
+
+def _solved(gram: np.ndarray, moment: np.ndarray, lit: np.ndarray) -> Float[np.ndarray, "... k"]:
+    """The weights that are `lit` at their optimum, whatever their sign, the others 0; NaN where there is none."""
+    # A ridge at the level of rounding: of columns that are alike any solution is one.
+    diagonal = np.diagonal(gram, axis1=-2, axis2=-1)
+    ridge = np.where(lit, 4.0 * np.finfo(float).eps * diagonal, 1.0)
+    among = lit[..., :, None] & lit[..., None, :]
+    system = np.where(among, gram, 0.0) + ridge[..., None] * np.eye(moment.shape[-1])
+    solvable = np.asarray(np.isfinite(system).all(axis=(-2, -1)) & np.isfinite(moment).all(axis=-1))
+    system = np.where(solvable[..., None, None], system, np.eye(moment.shape[-1]))
+    solved = np.linalg.solve(system, np.where(lit, moment, 0.0)[..., None])[..., 0]
+    return np.where(solvable[..., None], solved, np.nan)
 
 
 def _cost(gram: np.ndarray, moment: np.ndarray, w: np.ndarray) -> np.ndarray:

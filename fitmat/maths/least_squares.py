@@ -11,6 +11,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
+from fitmat.maths.grams import AbstractGram, Arrow, Layout, Whole, joined
+
 RTOL = 1e-8
 """Relative tolerance of the steps in units of each parameter's own scale, SciPy's default; convergence is quadratic."""
 
@@ -23,12 +25,24 @@ FEW = 8
 longer to compile."""
 
 
+class Residuals(NamedTuple):
+    """Residuals r of which it is known what each depends on.
+
+    Attributes:
+        columns: Those of one column depend on the shared parameters and on its own, (m, c).
+        single: Each depends on the parameter in its place only, (p,); or there are none, (0,).
+    """
+
+    columns: Float[Array, "m c"]
+    single: Float[Array, " p"]
+
+
 class Normal(NamedTuple):
     """What a Gauss–Newton step needs of all residuals: Σ r², Jᵀr and JᵀJ."""
 
     square: Float[Array, ""]
     slope: Float[Array, " p"]
-    gram: Float[Array, "p p"]
+    gram: AbstractGram
 
 
 class Minimum(eqx.Module):
@@ -53,9 +67,11 @@ class Minimum(eqx.Module):
     beside: Any = None
 
 
-def normal_equations(residual: Callable[[Float[Array, " p"]], Array], x: Float[Array, " p"]) -> Normal:
-    """Of the residuals of any shape at x."""
-    return _seen(lambda at: (residual(at), None), x)[0]
+def normal_equations(
+    residual: Callable[[Float[Array, " p"]], Any], x: Float[Array, " p"], layout: Layout | None = None
+) -> Normal:
+    """Of the residuals at x: of any shape, or `Residuals`, of whose `layout` use is made where it is given."""
+    return _seen(lambda at: (residual(at), None), x, layout)[0]
 
 
 def jacobian(of: Callable[[Float[Array, " p"]], Array], x: Float[Array, " p"]) -> tuple[Array, Float[Array, "p n"]]:
@@ -73,22 +89,47 @@ def _along(of: Callable[[Float[Array, " p"]], tuple[Array, Any]], x: Float[Array
 
 
 def _seen(
-    residual: Callable[[Float[Array, " p"]], tuple[Array, Any]], x: Float[Array, " p"]
+    residual: Callable[[Float[Array, " p"]], tuple[Any, Any]], x: Float[Array, " p"], layout: Layout | None
 ) -> tuple[Normal, Any, float]:
     """The normal equations at x, what the residuals come with, and how many they are."""
+    if layout is not None:
+        return _seen_by_kind(residual, x, layout)
     r, columns, beside = _along(lambda at: _flat(residual(at)), x)
-    return Normal(r @ r, columns @ r, columns @ columns.T), beside, float(r.size)
+    return Normal(r @ r, columns @ r, Whole(columns @ columns.T)), beside, float(r.size)
 
 
-def _flat(seen: tuple[Array, Any]) -> tuple[Array, Any]:
-    return seen[0].ravel(), seen[1]
+def _flat(seen: tuple[Any, Any]) -> tuple[Array, Any]:
+    parts = [part.ravel() for part in jax.tree.leaves(seen[0])]
+    return parts[0] if len(parts) == 1 else jnp.concatenate(parts), seen[1]
+
+
+def _seen_by_kind(
+    residual: Callable[[Float[Array, " p"]], tuple[Residuals, Any]], x: Float[Array, " p"], layout: Layout
+) -> tuple[Normal, Any, float]:
+    """The same of `Residuals`: one slope for each kind of parameter, all columns at once (Curtis, Powell & Reid 1974).
+
+    A. R. Curtis, M. J. D. Powell & J. K. Reid, On the estimation of sparse Jacobian matrices, J. Inst. Math. Appl. 13.
+    """
+    r, along, beside = jax.linearize(residual, x, has_aux=True)
+    slopes = [along(jnp.asarray(kind)) for kind in layout.kinds]
+    tall = jnp.stack([*(slope.columns for slope in slopes), r.columns])
+    table, of_all = jnp.einsum("qmc,tmc->cqt", tall, tall), len(layout.shared)
+    of_columns, own = jnp.sum(table, axis=0), slice(of_all, -1)
+    slope = joined(layout, of_columns[:of_all, -1], table[:, own, -1])
+    gram = Arrow(of_columns[:of_all, :of_all], table[:, own, :of_all], table[:, own, own], layout)
+    square = of_columns[-1, -1]
+    if r.single.size:
+        change = jnp.sum(jnp.stack([slope.single for slope in slopes]) * layout.kinds, axis=0)
+        square, slope, gram = square + r.single @ r.single, slope + change * r.single, gram.plus(change**2)
+    return Normal(square, slope, gram), beside, float(r.columns.size + r.single.size)
 
 
 def least_squares(
-    residual: Callable[[Float[Array, " p"], Any], tuple[Array, Any]],
+    residual: Callable[[Float[Array, " p"], Any], tuple[Any, Any]],
     x0: Float[Array, " p"],
     args: Any = None,
     *,
+    layout: Layout | None = None,
     tolerance: float = RTOL,
     max_steps: Any = 256,
     damping: Any = 1.0,
@@ -97,9 +138,10 @@ def least_squares(
     """Minimise ½Σ residual² from x0.
 
     Args:
-        residual: `residual(x, args)`, any shape, and arrays that come with it, or None.
+        residual: `residual(x, args)`, as `normal_equations` takes it, and arrays that come with it, or None.
         x0: Start, (p,).
         args: Passed on.
+        layout: Of `Residuals` that many columns share few parameters of.
         tolerance: Both the relative and the absolute tolerance in the scaled units.
         max_steps: Looks at all residuals before giving up.
         damping: The first λ, as a fraction of the usual one; smaller where the start is known to be close.
@@ -112,9 +154,9 @@ def least_squares(
 
     @jax.jit  # its shapes and its values by one trace
     def point(x: Array, args: Any) -> tuple[Array, tuple[Normal, Any, float]]:
-        here, beside, count = _seen(lambda at: residual(at, args), x)
+        here, beside, count = _seen(lambda at: residual(at, args), x, layout)
         if bend is not None:
-            here = here._replace(gram=here.gram + jnp.diag(bend(x, here.slope)))
+            here = here._replace(gram=here.gram.plus(bend(x, here.slope)))
         return jnp.sqrt(here.square), (here, beside, count)
 
     solver = LevenbergMarquardt(rtol=tolerance, atol=tolerance, limit=max_steps, damping=damping)
@@ -141,27 +183,8 @@ def relative_offset(here: Normal, freedom: Any) -> Float[Array, ""]:
         here: At the point.
         freedom: (n − p)/p.
     """
-    size = jnp.sqrt(jnp.diagonal(here.gram))
+    size = jnp.sqrt(here.gram.diagonal())
     scale = jnp.where(size > 0, 1.0 / jnp.where(size > 0, size, 1.0), 0.0)
-    gram = here.gram * scale[:, None] * scale + ROUNDING * len(size) * jnp.eye(len(size))
-    along = here.slope @ (scale * solve(gram, here.slope * scale))
+    gram = here.gram.scaled(scale).plus(jnp.full(len(size), ROUNDING * len(size)))
+    along = here.slope @ (scale * gram.solve(here.slope * scale))
     return jnp.sqrt(freedom * along / jnp.maximum(here.square - along, jnp.finfo(along.dtype).tiny))
-
-
-def solve(matrix: Float[Array, "p p"], right: Float[Array, " p"]) -> Float[Array, " p"]:
-    """x with A x = b for a positive definite A, by Gauss–Jordan elimination; NaN where A is not.
-
-    Without pivots, which such a matrix needs none of, and without LAPACK, which a program would have to be linked to.
-    """
-
-    def eliminated(k: Array, state: tuple[Array, Array]) -> tuple[Array, Array]:
-        table, positive = state
-        pivot = table[k, k]
-        row = table[k] / pivot
-        return (table - table[:, k, None] * row).at[k].set(row), positive & (pivot > 0)
-
-    if not len(right):
-        return right
-    begin = jnp.concatenate([matrix, right[:, None]], axis=1), jnp.array(True)
-    table, positive = jax.lax.fori_loop(0, len(right), eliminated, begin)
-    return jnp.where(positive, table[:, -1], jnp.nan)

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Bool
 
-from fitmat.maths.least_squares import ROUNDING, Normal, solve
+from fitmat.maths.least_squares import ROUNDING, Normal
 
 FIRST_DAMPING = 1e-3
 """The first λ relative to the diagonal of JᵀJ: starts from a grid are close, and a bad step is taken back."""
@@ -81,7 +81,7 @@ class LevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         """`step` with what was seen at the trial point."""
         there, old = seen[0], state.here[0]
         first = state.steps == 0
-        lengths = jnp.sqrt(jnp.diagonal(there.gram) * FIRST_DAMPING)
+        lengths = jnp.sqrt(there.gram.diagonal() * FIRST_DAMPING)
         first_unit = jnp.sqrt(there.square)
         natural = jnp.where(lengths > 0, first_unit / jnp.where(lengths > 0, lengths, 1.0), 1.0)
         scale = jnp.where(first, jnp.where(first_unit > 0, natural, 1.0), state.scale)
@@ -120,7 +120,7 @@ class LevenbergMarquardt(optx.AbstractLeastSquaresSolver):
 def _ahead(here: Normal, scale: Array, damping: Array) -> tuple[Array, Array]:
     """The damped step from a point, and by how much ½ Σ r² falls there where the residuals are linear."""
     unit = jnp.where(here.square > 0, here.square, 1.0)
-    slope, gram = here.slope * scale / unit, here.gram * scale[:, None] * scale / unit
-    least = ROUNDING * jnp.trace(gram)
-    step = -solve(gram + (damping + least) * jnp.eye(len(scale)), slope)
-    return step * scale, -unit * (slope @ step + 0.5 * step @ gram @ step)
+    slope, gram = here.slope * scale / unit, here.gram.scaled(scale / jnp.sqrt(unit))
+    least = ROUNDING * jnp.sum(gram.diagonal())
+    step = -gram.plus(jnp.full(len(scale), damping + least)).solve(slope)
+    return step * scale, -unit * (slope @ step + 0.5 * step @ gram.times(step))

@@ -152,6 +152,17 @@ def with_vector(model: M, values: Any) -> M:
     return jax.tree.unflatten(structure, parts)
 
 
+def of_channels(model: M, which: np.ndarray, channels: int) -> M:
+    """The same model of some of its channels.
+
+    Args:
+        model: With one number, or `channels` numbers, in each parameter.
+        which: Their positions.
+        channels: How many there are.
+    """
+    return jax.tree.map(lambda leaf: leaf[which] if np.shape(leaf) == (channels,) else leaf, model)
+
+
 def bounds(model: eqx.Module) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:
     """Lower and upper bounds of the model's parameter vector, physical units."""
     ends = [(e.param.lower, e.param.upper) for e in entries(model) for _ in range(e.size)]

@@ -127,7 +127,8 @@ def test_profiles_are_the_minima_that_scipy_finds(ordinary: Fit) -> None:
 
     @jax.jit
     def every(t: jax.Array) -> jax.Array:
-        return every_residual(with_vector(ordinary.model, whole.physical(t)), ordinary.data, s)
+        found = every_residual(with_vector(ordinary.model, whole.physical(t)), ordinary.data, s)
+        return jnp.concatenate([found.columns.ravel(), found.single])
 
     best = 0.5 * np.sum(np.asarray(every(jnp.asarray(whole.natural(ordinary.values)))) ** 2)
     for k in (2, 10, 22, 30):

@@ -48,7 +48,7 @@ def _seen(
         some = jnp.any(s >= 0.0)
         normal, x = looked(shared, data, s, measured, lambda: from_natural(shared.moved, t), some)
         every = summed(data.weight * log_pointwise(x, data.noise, shared.data(data), s))
-        return every, normal.slope.T, jnp.moveaxis(normal.gram, -1, 0), normal.square
+        return every, normal.slope.T, jnp.moveaxis(normal.gram.dense(), -1, 0), normal.square
 
     parts = jax.tree.map(
         lambda part: jnp.asarray(part).reshape(-1, block, *part.shape[1:]),

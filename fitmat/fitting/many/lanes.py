@@ -15,6 +15,7 @@ from jaxtyping import Array, Bool, Float
 from fitmat.fitting.coordinates import Coordinates
 from fitmat.fitting.likelihood import Data
 from fitmat.fitting.losses import Loss
+from fitmat.maths.grams import Whole
 from fitmat.maths.least_squares import Normal
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector
@@ -158,7 +159,7 @@ def _normal(r: Array, columns: list[Array], slopes: list[Array]) -> Normal:
     products = [[summed(a * b) for b in columns[: i + 1]] for i, a in enumerate(columns)]
     rows = [jnp.stack([products[max(i, j)][min(i, j)] * slopes[i] * slopes[j] for j in range(k)]) for i in range(k)]
     slope = jnp.stack([summed(r * column) * along for column, along in zip(columns, slopes, strict=True)])
-    return Normal(summed(r * r), slope, jnp.stack(rows))
+    return Normal(summed(r * r), slope, Whole(jnp.stack(rows)))
 
 
 def summed(part: Float[Array, "n c B"]) -> Float[Array, " B"]:

@@ -13,6 +13,7 @@ from jaxtyping import Array, ArrayLike, Bool, Float, Int
 from fitmat.fitting.likelihood import best_discrepancy, log_pointwise
 from fitmat.fitting.many.lanes import Samples, Shared, alone, from_unbounded, looked, summed
 from fitmat.fitting.refining import BURST, SETTLED, STEADY
+from fitmat.maths.grams import Whole
 from fitmat.maths.least_squares import RTOL, Normal, relative_offset
 from fitmat.maths.levenberg_marquardt import LevenbergMarquardt
 from fitmat.maths.programs import program_run_often
@@ -139,7 +140,11 @@ class _Work(NamedTuple):
             self.shared, at.data, at.s, at.measured, lambda: from_unbounded(moved, trial), jnp.any(moving)
         )
         bent = jnp.eye(len(trial))[:, :, None] * moved.bend(trial, normal.slope)
-        seen = normal._replace(gram=normal.gram + bent), (x if self.infers else None), jnp.zeros_like(at.s)
+        seen = (
+            normal._replace(gram=Whole(normal.gram.dense() + bent)),
+            (x if self.infers else None),
+            jnp.zeros_like(at.s),
+        )
         u, state, _ = jax.vmap(_solver().judged, in_axes=-1, out_axes=-1)(at.u, at.state, seen)
         u, state = jax.tree.map(lambda new, old: jnp.where(moving, new, old), (u, state), (at.u, at.state))
         return at._replace(u=u, state=state, steps=at.steps + moving)
@@ -163,7 +168,7 @@ class _Work(NamedTuple):
         k, (n, c) = self.starts.shape[1], self.samples.x.shape[1:]
         data = jax.tree.map(lambda part: jnp.ones((*jnp.shape(part)[1:], block)), self.samples)
         zero, x = jnp.zeros(block), jnp.zeros((n, c, block))
-        normal = Normal(zero, jnp.zeros((k, block)), jnp.zeros((k, k, block)))
+        normal = Normal(zero, jnp.zeros((k, block)), Whole(jnp.zeros((k, k, block))))
         state = jax.vmap(lambda u, here: _solver().init(None, u, None, None, None, here, None), -1, -1)(
             normal.slope, (normal, x if self.infers else None, zero)
         )
