@@ -18,6 +18,7 @@ import numpy as np
 from fitmat import arguments, files
 from fitmat._types import Progress
 from fitmat.batches.atlas import UNREADABLE, Atlas, read_atlas, unpacked
+from fitmat.batches.maps import maps
 from fitmat.fitting.losses import DEFAULT, loss
 from fitmat.fitting.many.concluding import OUTCOMES
 from fitmat.fitting.many.fits import Fits
@@ -42,11 +43,13 @@ class Texture:
     Attributes:
         file: The arrays on disk: each parameter by its name, `NAME_sd`, `outcome` with the `outcomes` that its numbers
             mean, `discrepancy`, `n_values`, and the names of the `channels`.
-        fits: The same.
+        maps: Pictures of the parameters and a glTF material that binds them; see `maps`.
+        fits: The arrays.
         earlier: Points that an earlier run had fitted.
     """
 
     file: Path
+    maps: tuple[Path, ...]
     fits: Fits
     earlier: int
 
@@ -106,7 +109,9 @@ def fit_texture(
         whole = {name: np.concatenate([tile[name] for tile in tiles]) for name in KEPT}
         shaped = {name: part.reshape(*axes, *part.shape[1:]) for name, part in whole.items()}
         fits = Fits(shared.template, atlas.channels, held, **shaped)
-        return Texture(files.write_bytes(target / RESULT, _packed(_arrays(fits))), fits, earlier)
+        file = files.write_bytes(target / RESULT, _packed(_arrays(fits)))
+        drawn = [files.write_bytes(target / name, content) for name, content in maps(fits).items()]
+        return Texture(file, tuple(drawn), fits, earlier)
 
 
 def _tile(atlas: Atlas, part: slice) -> tuple[np.ndarray, np.ndarray | None]:
@@ -139,8 +144,8 @@ def _read(kept: Path, count: int) -> dict[str, np.ndarray] | None:
 
 
 def _packed(arrays: Mapping[str, np.ndarray]) -> bytes:
-    memory = io.BytesIO()
-    np.savez_compressed(memory, **arrays)
+    memory, named = io.BytesIO(), dict[str, Any](arrays)
+    np.savez_compressed(memory, **named)
     return memory.getvalue()
 
 

@@ -107,7 +107,8 @@ def texture(
     except KeyboardInterrupt:
         process.say(f"fitmat: interrupted; what was done is kept in {folder}: the same command goes on.", err=True)
         raise SystemExit(interrupts.INTERRUPTED) from None
-    process.say(f"{found}\n\nArrays: {found.file}")
+    drawn = f"\nMaps: {', '.join(path.name for path in found.maps)}" if found.maps else ""
+    process.say(f"{found}\n\nArrays: {found.file}{drawn}")
 
 
 def show(found: Batch, screen: Console | None = None) -> None:

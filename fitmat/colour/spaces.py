@@ -111,7 +111,11 @@ def shown(xyz: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3"]:
 
 def to_srgb(xyz: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3"]:
     """XYZ (white Y = 1) as sRGB values from 0 to 1, encoded as in IEC 61966-2-1."""
-    values = np.clip(linear(xyz), 0.0, 1.0)
+    return encoded(np.clip(linear(xyz), 0.0, 1.0))
+
+
+def encoded(values: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+    """Linear values from 0 to 1 as sRGB has them, IEC 61966-2-1."""
     return np.where(values <= 0.0031308, 12.92 * values, 1.055 * values ** (1 / 2.4) - 0.055)
 
 

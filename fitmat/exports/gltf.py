@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from fitmat.exports.closest import Closest, closest, coloured
 from fitmat.exports.material import Chosen
@@ -81,11 +81,32 @@ def material(name: str, found: Closest) -> dict[str, Any]:
 def texts(name: str, header: Sequence[str], found: Closest) -> dict[str, str]:
     """File names → texts: a scene of one sphere with the material, what there is to say in `asset.extras`."""
     made = material(name, found)
-    brushed = "KHR_materials_anisotropy" in made["extensions"]
-    buffer, views, accessors = _sphere(brushed)
-    attributes = {"POSITION": 0, "NORMAL": 1} | ({"TANGENT": 2} if brushed else {})
-    document = {
-        "asset": {"version": "2.0", "generator": "fitmat", "extras": {"about": [*header, *found.intervals, VIEWERS]}},
+    about = [*header, *found.intervals, VIEWERS]
+    return {f"{name}.gltf": document(name, about, made, *_sphere("KHR_materials_anisotropy" in made["extensions"]))}
+
+
+def document(
+    name: str,
+    about: Sequence[str],
+    made: Mapping[str, Any],
+    corners: Mapping[str, Float[np.ndarray, "v d"]],
+    faces: Int[np.ndarray, "f 3"],
+    pictures: Sequence[str] = (),
+) -> str:
+    """A scene of one body.
+
+    Args:
+        name: Of the body.
+        about: What there is to say, in `asset.extras`.
+        made: The material's object.
+        corners: Attribute → its values at every corner, `POSITION` first.
+        faces: Three corners each.
+        pictures: Files that the material's textures show, by their numbers.
+    """
+    buffer, views, accessors = _packed(list(corners.values()), faces)
+    attributes = {attribute: k for k, attribute in enumerate(corners)}
+    whole: dict[str, Any] = {
+        "asset": {"version": "2.0", "generator": "fitmat", "extras": {"about": list(about)}},
         "extensionsUsed": sorted(made["extensions"]),
         "scene": 0,
         "scenes": [{"nodes": [0]}],
@@ -101,11 +122,14 @@ def texts(name: str, header: Sequence[str], found: Closest) -> dict[str, str]:
             }
         ],
     }
-    return {f"{name}.gltf": json.dumps(document, indent=1, allow_nan=False) + "\n"}
+    if pictures:
+        whole["images"] = [{"uri": picture} for picture in pictures]
+        whole["textures"] = [{"source": k} for k in range(len(pictures))]
+    return json.dumps(whole, indent=1, allow_nan=False) + "\n"
 
 
-def _sphere(brushed: bool) -> tuple[bytes, list[dict[str, int]], list[dict[str, Any]]]:
-    """Bytes, views and accessors of a unit sphere: positions, normals, where needed tangents, and indices."""
+def _sphere(brushed: bool) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Corners and faces of a unit sphere, where needed with tangents."""
     polar, around = np.meshgrid(
         np.linspace(0.0, np.pi, RINGS + 1), np.linspace(0.0, 2.0 * np.pi, SEGMENTS + 1), indexing="ij"
     )
@@ -114,8 +138,15 @@ def _sphere(brushed: bool) -> tuple[bytes, list[dict[str, int]], list[dict[str, 
     corner = (np.arange(RINGS)[:, None] * (SEGMENTS + 1) + np.arange(SEGMENTS)).ravel()
     below = corner + SEGMENTS + 1
     upper, lower = np.stack([corner, below, corner + 1], 1), np.stack([corner + 1, below, below + 1], 1)
-    faces = np.concatenate([upper[SEGMENTS:], lower[:-SEGMENTS]])
-    flat = [a.reshape(-1, a.shape[-1]).astype("<f4") for a in (normal, normal, tangent)[: 3 if brushed else 2]]
+    corners = {"POSITION": normal, "NORMAL": normal} | ({"TANGENT": tangent} if brushed else {})
+    return corners, np.concatenate([upper[SEGMENTS:], lower[:-SEGMENTS]])
+
+
+def _packed(
+    corners: Sequence[np.ndarray], faces: np.ndarray
+) -> tuple[bytes, list[dict[str, int]], list[dict[str, Any]]]:
+    """Bytes, views and accessors of attributes of corners, and of faces."""
+    flat = [part.reshape(-1, part.shape[-1]).astype("<f4") for part in corners]
     views, accessors, content = [], [], b""
     for part in (*flat, faces.reshape(-1, 1).astype("<u2")):
         of_face = part.dtype == np.dtype("<u2")

@@ -1,12 +1,16 @@
 """Textures: an atlas is fitted as its arrays are, tiles are kept and used again, and wrong files are one sentence."""
 
+import json
+import shutil
 import signal
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 from typer.testing import CliRunner
 
 import fitmat as fm
@@ -91,6 +95,54 @@ def test_tiles_are_kept_and_used_again(atlas: Path, tmp_path: Path, monkeypatch:
     calls += [0, 0]
     other: dict[str, Any] = {"loss": "default"}
     assert fit_texture(atlas, out, **other).earlier == 0
+
+
+def test_maps_hold_the_parameters(atlas: Path, tmp_path: Path) -> None:
+    """Of glTF 2.0, sections 3.9.2 and 5.22.2, and IEC 61966-2-1: sRGB colours, roughness √α in green."""
+    found = fit_texture(atlas, tmp_path / "out", **TOLD)
+    assert [path.name for path in found.maps] == [
+        *("base_color.png", "metallic_roughness.png", "specular_color.png", "texture.gltf")
+    ]
+    pictures = [np.asarray(Image.open(path), float) / 255.0 for path in found.maps[:3]]
+    base, rough, specular = pictures
+    there = found.fits.result == "converged"
+    assert base.shape == (ROWS, COLUMNS, 3)
+    decoded = np.where(base <= 0.04045, base / 12.92, ((base + 0.055) / 1.055) ** 2.4)
+    np.testing.assert_allclose(decoded[there][:, 0], found.fits["kd"][there, 0], atol=0.005)
+    np.testing.assert_allclose(rough[there][:, 1] ** 2, found.fits["alpha"][there], atol=0.005)
+    assert (rough[..., 2] == 0.0).all()
+    material = json.loads(found.maps[3].read_text())["materials"][0]
+    ior = material["extensions"]["KHR_materials_ior"]["ior"]
+    assert ior == pytest.approx(1.5, rel=1e-9)  # ks and eta are fixed
+    assert (specular == 1.0).all()
+    assert decoded[1, 2, 0] == pytest.approx(np.nanmedian(found.fits["kd"]), abs=0.005)
+
+
+def test_points_in_no_rows_have_no_maps(tmp_path: Path) -> None:
+    told: dict[str, Any] = arrays()
+    told |= {name: told[name].reshape(-1, SAMPLES, 1)[:2] for name in ("value", "sigma")}
+    np.savez(tmp_path / "points.npz", **told)
+    found = fit_texture(tmp_path / "points.npz", tmp_path / "out", **TOLD)
+    assert (found.maps, found.fits.outcome.shape) == ((), (2,))
+
+
+@pytest.mark.study
+def test_khronos_finds_no_fault_in_a_texture(atlas: Path, tmp_path: Path) -> None:
+    node = shutil.which("node")
+    if node is None or subprocess.run([node, "-e", "require('gltf-validator')"], capture_output=True).returncode:
+        pytest.skip("no gltf-validator: npm install gltf-validator, and name its node_modules in NODE_PATH")
+    file = fit_texture(atlas, tmp_path / "out", **TOLD).maps[-1]
+    ended = subprocess.run([node, "-e", VALIDATE, str(file)], capture_output=True, check=True)
+    issues = json.loads(ended.stdout)
+    assert (issues["numErrors"], issues["numWarnings"]) == (0, 0), issues
+
+
+VALIDATE = """
+const fs = require('fs'), path = require('path'), folder = path.dirname(process.argv[1]);
+require('gltf-validator').validateBytes(new Uint8Array(fs.readFileSync(process.argv[1])), {
+    externalResourceFunction: (uri) => Promise.resolve(new Uint8Array(fs.readFileSync(path.join(folder, uri)))),
+}).then((found) => console.log(JSON.stringify(found.issues)));
+"""
 
 
 def test_a_full_disk_is_one_sentence(atlas: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
