@@ -78,6 +78,20 @@ vec3 coat_series(vec3 k[10], float c) {
     return k[0] + x * one - two;
 }
 
+// Spectra with slopes at ascending roots of c: cubic between, straight beyond.
+vec3 coat_curve(float roots[19], vec3 values[19], vec3 slopes[19], float c) {
+    float x = sqrt(max(c, 1e-8));
+    int k = 0;
+    for (int j = 1; j < 18; ++j) {
+        k = x > roots[j] ? j : k;
+    }
+    float step = roots[k + 1] - roots[k], t = (x - roots[k]) / step;
+    float u = clamp(t, 0.0, 1.0), rise = u * u * (3.0 - 2.0 * u);
+    vec3 first = (u * (1.0 - u) * (1.0 - u) + min(t, 0.0)) * slopes[k];
+    vec3 last = (u * u * (u - 1.0) + max(t - 1.0, 0.0)) * slopes[k + 1];
+    return mix(values[k], values[k + 1], rise) + step * (first + last);
+}
+
 // Fresnel reflectance of a dielectric, unpolarised (Cook & Torrance 1982, eq. 15); 1 beyond total reflection.
 vec3 dielectric(float c, vec3 eta) {
     vec3 square = (eta - 1.0) * (eta + 1.0) + c * c;

@@ -122,10 +122,9 @@ def _lobe(lobe: AbstractBRDF, *, free: bool) -> str:
 
 def _base(lobe: AbstractBRDF) -> tuple[str, list[str]]:
     """Of a cover what lies below it: its functions, and the one that the cover calls."""
-    inner = [getattr(lobe, f.name) for f in dataclasses.fields(lobe) if f.name == "base"]
-    if not inner:
+    if (inner := lobe.below()) is None:
         return "", []
-    below, total = _sum(inner[0], free=False)
+    below, total = _sum(inner, free=False)
     return below, [f"vec3 base(vec3 wi, vec3 wo) {{\n    return {total};\n}}"]
 
 

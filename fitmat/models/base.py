@@ -7,7 +7,7 @@ import dataclasses
 from abc import abstractmethod
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, ClassVar, overload
+from typing import Any, ClassVar, Self, overload
 
 import jax
 import jax.numpy as jnp
@@ -56,12 +56,18 @@ class AbstractBRDF(AbstractShaded):
         """Whether only the difference of the two azimuths counts."""
 
     def mirror(self, wi: Vec3) -> Spectrum:
-        """Fraction of the light from ω_i that leaves in the mirror direction alone, where no value of f holds it: 0.
-
-        Only a polished coat has one.
-        """
+        """Fraction of the light from ω_i that leaves in the mirror direction alone; 0 but for polished coats."""
         del wi
         return jnp.zeros(())
+
+    def below(self) -> "AbstractBRDF | None":
+        """What its `glsl` calls `base`: of a coat what is below it, as it looks through the coat; else None."""
+        return None
+
+    def widened(self, slope: Scalar) -> "AbstractBRDF":
+        """As it looks through a rough face, whose slopes add to its own; as it is where it has none."""
+        del slope
+        return self
 
 
 class AbstractShape(AbstractShaded):
@@ -80,6 +86,11 @@ class AbstractShape(AbstractShaded):
     @abstractmethod
     def local(self, w: Vec3) -> Vec3:
         """A direction in the frame whose x axis is the tangent."""
+
+    def widened(self, slope: Scalar) -> Self:
+        """With the slopes of another surface added; as it is where it has none."""
+        del slope
+        return self
 
 
 LEVEL = """
@@ -113,6 +124,11 @@ class AbstractLobe(AbstractBRDF):
     def isotropic(self) -> bool:
         """Where every shape among the parts is."""
         return all(part.isotropic for part in vars(self).values() if isinstance(part, AbstractShape))
+
+    def widened(self, slope: Scalar) -> Self:
+        """With every shape among the parts widened."""
+        shapes = {name: part for name, part in vars(self).items() if isinstance(part, AbstractShape)}
+        return dataclasses.replace(self, **{name: part.widened(slope) for name, part in shapes.items()})
 
 
 class AbstractSpecular(AbstractLobe):
@@ -154,6 +170,10 @@ class Sum(AbstractBRDF):
     def isotropic(self) -> bool:
         """Where all lobes are."""
         return all(lobe.isotropic for lobe in self.lobes)
+
+    def widened(self, slope: Scalar) -> "Sum":
+        """The sum of the lobes, widened."""
+        return Sum(tuple(lobe.widened(slope) for lobe in self.lobes))
 
     def mirror(self, wi: Vec3) -> Spectrum:
         """The sum over the lobes."""

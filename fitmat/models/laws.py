@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 from fitmat.maths.directions import from_angles, mirror
 from fitmat.maths.programs import program
 from fitmat.models.albedo import albedo
-from fitmat.models.base import AbstractBRDF
+from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.lobes.kulla_conty import KullaConty
 from fitmat.models.lobes.microfacet import Microfacet
 from fitmat.models.parameters import Entry, bounds, entries, vector, with_vector
@@ -218,7 +218,8 @@ def unbounded(template: AbstractBRDF) -> int:
     """How many values and slopes are not finite, at the singular pairs and the corners of the parameters.
 
     Slopes in all parameters and both directions; corners are all parameters at a lower or upper bound, and each
-    alone at either with the rest as given.
+    alone at either with the rest as given. Values and slopes in parameters are summed over the pairs, as one that is
+    not finite makes a sum that is not; so that what a coat exchanges with its base is solved once a corner.
     """
     ends, given = bounds(template), np.asarray(vector(template))
     rows = list(ends)
@@ -231,10 +232,10 @@ def unbounded(template: AbstractBRDF) -> int:
 @program
 def _not_finite(template: AbstractBRDF, values: Array, wi: Array, wo: Array) -> Array:
     def total(v: Array, a: Array, b: Array) -> Array:
-        return jnp.sum(with_vector(template, v)(a, b))
+        return jnp.sum(evaluate_pairs(with_vector(template, v), a, b))
 
     def corner(v: Array) -> Array:
-        found = jax.vmap(jax.value_and_grad(total, argnums=(0, 1, 2)), (None, 0, 0))(v, wi, wo)
+        found = jax.value_and_grad(total, argnums=(0, 1, 2))(v, wi, wo)
         return sum((jnp.sum(~jnp.isfinite(leaf)) for leaf in jax.tree.leaves(found)), jnp.array(0))
 
     return jnp.sum(jax.lax.map(corner, values))

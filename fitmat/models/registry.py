@@ -15,9 +15,10 @@ from jaxtyping import ArrayLike
 from fitmat import arguments
 from fitmat.errors import ModelError
 from fitmat.models import names
-from fitmat.models.around.coat import RoughCoat, SmoothCoat, Varnish
+from fitmat.models.around.coat import RoughCoat, SmoothCoat
 from fitmat.models.around.plastic import Plastic
 from fitmat.models.around.tilt import Tilted
+from fitmat.models.around.varnish import Varnish
 from fitmat.models.base import AbstractBRDF, Sum
 from fitmat.models.estimated import Estimator, Walked, unfitted
 from fitmat.models.lobes.abg import ABg

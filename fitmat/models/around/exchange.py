@@ -15,13 +15,23 @@ from jaxtyping import Array, Float
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import COS_MIN, mirror, rotated
 from fitmat.maths.quadrature import cosine_mean, gauss
-from fitmat.models.around.layer import Energy, Layer
+from fitmat.models.around.layer import Energy, Layer, Ways
+from fitmat.models.around.nodes import (
+    FINE,
+    KEPT,
+    LEAVING,
+    Curve,
+    cardinal,
+    cosines,
+    curve,
+    finer,
+    hermite,
+    inside,
+    leaving,
+)
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.glsl import spectrum, table
 from fitmat.models.lobes.lambert import Lambert
-
-LEAVING, KEPT = 10, 5
-"""Cosines at which energies are known: outer ones, whose light can leave, and inner ones below the critical angle."""
 
 RAYS, STEPS = 8, 8
 """Of the rule over what the base reflects: azimuths about the mirror direction (over half a turn), and distances from
@@ -33,94 +43,89 @@ AZIMUTHS = 4
 TRAPPED = 1e-6
 """Share of the returned light that is dropped at each bounce, so that light which never leaves has a limit."""
 
+SWEEPS = 4
+"""Of the search for the factors of the lobe; each halves the logarithm of what is missing."""
+
 _TINY, _ALMOST = 1e-16, 0.999
+
+_NODES = np.r_[: len(FINE) : 2, len(FINE) : len(FINE) + KEPT]
+"""The nodes among `FINE` and those below the critical angle."""
 
 
 class Exchange(eqx.Module):
     """What the base's light becomes by going back and forth, over outer cosines.
 
     Attributes:
-        base: The base; it counts here for its own mirror image p.
         layer: The coat.
-        peak: Of s, what one more bounce adds to the base's lobe in the mirror direction, relative; coefficients (k, c).
-        rest: Of e, the fraction of the refracted light that leaves later and is not in the lobe so raised.
+        raised: h, what the base's lobe as it is seen is multiplied with, at each of the two directions.
+        later: e, the fraction of the light at the base that leaves and is not in the lobe so raised.
     """
 
-    base: AbstractBRDF
     layer: Layer
-    peak: Float[Array, "k c"]
-    rest: Float[Array, "k c"]
-
-    def raised(self, outer: Array) -> Energy:
-        """1/√(1 − s) · 1/(1 − p R): what the base's lobe is multiplied with, at each of the two directions."""
-        ratio = jnp.clip(_powers(_root(outer), LEAVING) @ self.peak, 0.0, _ALMOST)
-        return _repeated(self.base, self.layer, outer, self.layer.inner(outer)) / jnp.sqrt(1.0 - ratio)
+    raised: Curve
+    later: Curve
 
     def spread(self, ci: Scalar, co: Scalar) -> Spectrum:
-        """BRDF inside the coat, sr⁻¹, of the rest: η² e(c_i) e(c_o)/(π 2∫ e T c dc).
+        """BRDF inside the coat, sr⁻¹, of the rest: η² e(c_i) e(c_o)/(π 2∫ e E c dc).
 
         Kulla & Conty's form (2017): reciprocal, and its energy is e.
         """
-        return self.layer.eta**2 * self._later(ci) * self._later(co) / (jnp.pi * self._whole())
+        return self.layer.eta**2 * self.later(ci) * self.later(co) / (jnp.pi * self._whole())
 
-    def numbers(self) -> tuple[Array, Array, Spectrum]:
-        """`peak` and `rest` as coefficients of Chebyshev polynomials in 2√c − 1, and what `spread` divides by."""
-        turned = jnp.asarray(_TO_CHEBYSHEV)
-        return turned @ self.peak, turned @ self.rest, self._whole()
+    def numbers(self) -> tuple[Curve, Curve, Spectrum]:
+        """`raised`, `later`, and what `spread` divides by."""
+        return self.raised, self.later, self._whole()
 
     def _whole(self) -> Spectrum:
-        return jnp.maximum(cosine_mean(lambda c: self._later(c) * self._leaves(c)), _TINY)
-
-    def _later(self, outer: Array) -> Energy:
-        return jnp.maximum(_powers(_root(outer), LEAVING) @ self.rest, 0.0)
-
-    def _leaves(self, outer: Scalar) -> Energy:
-        return self.layer.crossing(outer, self.layer.inner(outer))[0]
+        return jnp.maximum(cosine_mean(lambda c: self.later(c) * self.layer.entering(c)), _TINY)
 
 
-def mirrored(base: AbstractBRDF, layer: Layer, wi: Vec3) -> Energy:
+def mirrored(seen: AbstractBRDF, layer: Layer, wi: Vec3) -> Energy:
     """Fraction of the light from outside that leaves by the mirror image of the base, T² p/(1 − p R)."""
-    below = layer.refracted(wi)
-    leaves, back = layer.crossing(wi[2], below[2])
-    image = base.mirror(below)
-    return leaves**2 * image / jnp.maximum(1.0 - image * back, _TINY)
+    image = seen.mirror(layer.refracted(wi))
+    back = layer.reflectance(wi[2]) * layer.left(layer.refracted(wi)[2]) ** 2
+    return layer.entering(wi[2]) ** 2 * image / jnp.maximum(1.0 - image * back, _TINY)
 
 
-def exchange(base: AbstractBRDF, layer: Layer) -> Exchange:
+def exchange(base: AbstractBRDF, seen: AbstractBRDF, layer: Layer) -> Exchange:
     """Solve for the light that comes back to the base, once for all directions.
 
     g(c′) is the fraction of the light on the base from c′ that leaves in the end, by any number of bounces: the
     adding equation (K. N. Liou, An Introduction to Atmospheric Radiation, 2002, sec. 6.4) for the mean over azimuth,
 
-    g(c′) = ∫ f(c′, ω) (T + R g)(ω·n) c dω,  T = (1 − R₁) exp(−τ/c), R = R₁ exp(−2τ/c)
+    g = B (L + A R A g),  L = A (1 − R 1),  A = exp(−τ/c′)
 
-    by product integration at `LEAVING` + `KEPT` cosines: the kernel may be as narrow as a mirror's. For a Lambert base
-    s = ρR and nothing is left: Saunderson's ρ/(π(1 − ρR)). A base that reflects more than it receives exchanges light
-    as if it were scaled down to all.
+    with what the base sends between the nodes, B, and what the face does, R, as matrices by product integration: the
+    kernels may be as narrow as a mirror's. For a Lambert base nothing is left: Saunderson's ρ/(π(1 − ρR)). A base that
+    reflects more than it receives exchanges light as if it were scaled down to all.
+
+    Args:
+        base: What is below the coat.
+        seen: The base with its lobes as wide as they are seen through the face; the base itself through a smooth one.
+        layer: The coat.
     """
     if isinstance(base, Lambert):
-        first = jnp.zeros((LEAVING, 1)).at[0].set(1.0)
-        ratio = jnp.atleast_1d(base.kd) * layer.returned()
-        return Exchange(base, layer, first * ratio, 0.0 * first)
-    nodes = jnp.asarray(_ROOTS**2)
-    outer = jnp.concatenate([nodes, jnp.zeros(KEPT)])
-    inner = jnp.concatenate([layer.inner(nodes), layer.critical() * jnp.asarray(_BELOW)])
-    sent = jax.vmap(lambda cos: _sent(base, layer, cos))(inner)
+        every = jnp.ones((len(FINE), 1)) / jnp.sqrt(1.0 - jnp.atleast_1d(base.kd) * layer.returned())
+        return Exchange(layer, Curve(FINE, every, 0.0 * every), Curve(FINE, 0.0 * every, 0.0 * every))
+    _, inner = cosines(layer.eta)
+    ways = layer.ways()
+    fine = jnp.concatenate([inside(layer.eta, jnp.asarray(FINE**2)), inner[LEAVING:]])
+    if seen is base:
+        every = jax.vmap(lambda cos: _sent(base, layer, cos))(fine)
+        sent, through = (Sent(*(part[rows] for part in every)) for rows in (_NODES, np.arange(len(FINE))))
+    else:
+        sent = jax.vmap(lambda cos: _sent(base, layer, cos))(inner)
+        through = jax.vmap(lambda cos: _sent(seen, layer, cos))(fine[: len(FINE)])
     image = _mirror(base, inner)
     scale = 1.0 / jnp.maximum(image + jnp.sum(sent.energy, axis=1), 1.0)
-    energy, image = sent.energy * scale[:, None], image * scale
-    (leave, back), (leave_here, back_here) = layer.crossing(sent.outer, sent.inner), layer.crossing(outer, inner)
-    once = jnp.sum(energy * leave, axis=1) + image * leave_here
-    returned = jnp.einsum("nqc,nqk->cnk", energy * back, _basis(layer, sent))
-    returned += jax.vmap(jnp.diag)((image * back_here).T)
-    total = jnp.linalg.solve(jnp.eye(len(inner)) - (1.0 - TRAPPED) * returned, once.T[..., None])[..., 0].T
-    second = jnp.sum(sent.energy * back * sent.twice, axis=1) / jnp.maximum(sent.peak, _TINY)
-    most = 1.0 - once / jnp.maximum(total, _TINY)
-    ratio = jnp.asarray(_TO_LEAVING) @ jnp.clip(second, 0.0, jnp.clip(most, 0.0, _ALMOST))[:LEAVING]
-    found = Exchange(base, layer, ratio, 0.0 * ratio)
-    shown = jnp.sum(energy * leave * found.raised(sent.outer), axis=1) * found.raised(outer)
-    rest = total - shown - image * leave_here * _repeated(base, layer, outer, inner)
-    return Exchange(base, layer, ratio, jnp.asarray(_TO_LEAVING) @ rest[:LEAVING])
+    kernel = jnp.einsum("nqc,nqk->cnk", sent.energy, cardinal(layer.eta, sent.inner))
+    kernel = (kernel + jax.vmap(jnp.diag)(image.T)) * scale.T[..., None]
+    once = jnp.einsum("cnk,kc->nc", kernel, ways.leaves)
+    loop = jnp.eye(len(inner)) - (1.0 - TRAPPED) * jnp.einsum("cnk,kmc->cnm", kernel, ways.back)
+    total = jnp.linalg.solve(loop, once.T[..., None])[..., 0].T
+    once, total = (jnp.einsum("jnc,nc->jc", ways.entered, part) for part in (once, total))
+    through = through._replace(energy=through.energy * finer(scale[:LEAVING])[:, None])
+    return Exchange(layer, *(curve(FINE, part) for part in _shared(seen, layer, ways, through, once, total)))
 
 
 class Sent(NamedTuple):
@@ -168,7 +173,7 @@ def _sent(base: AbstractBRDF, layer: Layer, cos: Scalar) -> Sent:
     out = jnp.sqrt(jnp.maximum(1.0 - out2, COS_MIN**2))
     wi, wo = jnp.stack([sin, 0.0 * sin, cos]), jnp.stack([x, y, out], axis=-1)
     f, twice, peak = _averaged(base, wi, wo)
-    return Sent(layer.outer(out2), out, f * area.ravel()[:, None], twice, peak)
+    return Sent(leaving(layer.eta, out), out, f * area.ravel()[:, None], twice, peak)
 
 
 def _averaged(base: AbstractBRDF, wi: Vec3, wo: Float[Array, "q 3"]) -> tuple[Energy, Energy, Spectrum]:
@@ -194,64 +199,61 @@ def _mirror(base: AbstractBRDF, inner: Array) -> Energy:
     return found.reshape(*inner.shape, -1)
 
 
-def _repeated(base: AbstractBRDF, layer: Layer, outer: Array, inner: Array) -> Energy:
-    """1/(1 − p R): what the mirror image of the base itself adds by going back and forth."""
-    return 1.0 / jnp.maximum(1.0 - _mirror(base, inner) * layer.crossing(outer, inner)[1], _TINY)
+def _shared(
+    seen: AbstractBRDF, layer: Layer, ways: Ways, sent: Sent, once: Energy, total: Energy
+) -> tuple[Array, Array]:
+    """What leaves after one bounce and after all, (k, c), shared between lobe and rest: h and e at `FINE`.
 
-
-def _basis(layer: Layer, sent: Sent) -> Array:
-    """Cardinal functions of the nodes: polynomials in √c above the critical angle, in c′ below."""
-    leaving = _powers(_root(sent.outer), LEAVING) @ _TO_LEAVING
-    kept = _powers(jnp.minimum(sent.inner / layer.critical(), 1.0), KEPT) @ _TO_KEPT
+    Near the critical angle what a lobe sends out changes faster than the nodes stand.
+    s is what one more bounce adds to the lobe in the mirror direction, relative, a bounce off a rough face being as
+    much fainter there as it is wider. h h times the energy of the lobe as it is seen is what leaves once, over 1 − s.
+    """
+    _, inner = cosines(layer.eta)
+    image = _mirror(seen, inner[:LEAVING])
+    repeated = 1.0 / jnp.maximum(1.0 - image * jnp.einsum("nnc->nc", ways.back)[:LEAVING], _TINY)
+    direct = image * ways.leaves[:LEAVING]
     leaves = (sent.outer > 0.0)[..., None]
-    return jnp.concatenate([jnp.where(leaves, leaving, 0.0), jnp.where(leaves, 0.0, kept)], axis=-1)
+    leave = jnp.where(leaves, layer.entering(jnp.where(leaves[..., 0], sent.outer, 1.0)), 0.0)
+    kernel, along = (jnp.einsum("jqc,jqk->cjk", sent.energy * leave, at) for at in hermite(FINE, sent.outer))
+    back = cardinal(layer.eta, sent.inner) @ jnp.sum(ways.back, axis=1)
+    second = jnp.sum(sent.energy * back * sent.twice, axis=1) / jnp.maximum(sent.peak, _TINY)
+    wide = seen.width() ** 2
+    second = jnp.clip(second * wide / (wide + layer.slope**2), 0.0, _ALMOST)
+    all_sent, leaving_sent = jnp.sum(sent.energy, axis=1), jnp.sum(sent.energy * leave, axis=1)
+    every = all_sent * finer((total - direct * repeated) / jnp.maximum(all_sent[::2], _TINY))
+    once = leaving_sent * finer((once - direct) / jnp.maximum(leaving_sent[::2], _TINY))
+    repeated = finer(repeated)
+    wanted = jnp.clip(once * repeated**2 / (1.0 - second), 0.0, jnp.maximum(every, 0.0))
+    factor = repeated / jnp.sqrt(1.0 - second)
+
+    def lobe(factor: Array) -> Energy:
+        return jnp.einsum("cjk,kc->jc", kernel, factor) + jnp.einsum("cjk,kc->jc", along, curve(FINE, factor).slopes)
+
+    def swept(_: int, factor: Array) -> Array:
+        return jnp.sqrt(factor * (wanted + _TINY) / (lobe(factor) + _TINY))
+
+    factor = jax.lax.fori_loop(0, SWEEPS, swept, factor)
+    return factor, jnp.maximum(every - factor * lobe(factor), 0.0)
 
 
-def _root(outer: Array) -> Array:
-    """√c, with a slope at 0."""
-    return jnp.sqrt(jnp.maximum(outer, 1e-8))
-
-
-def _powers(x: Array, count: int) -> Array:
-    """1, x, …, x^(count−1), last axis."""
-    return x[..., None] ** jnp.arange(count)
-
-
-def _points(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Chebyshev points on [0, 1], and the matrix from values at them to the coefficients of powers."""
-    x = (np.polynomial.chebyshev.chebpts1(count) + 1.0) / 2.0
-    return x, np.linalg.inv(np.vander(x, increasing=True))
-
-
-_ROOTS, _TO_LEAVING = _points(LEAVING)
-_BELOW, _TO_KEPT = _points(KEPT)
-
-_TO_CHEBYSHEV = np.stack(
-    [
-        np.polynomial.chebyshev.poly2cheb(np.polynomial.polynomial.polypow([0.5, 0.5], k)).tolist()
-        + [0.0] * (LEAVING - 1 - k)
-        for k in range(LEAVING)
-    ],
-    axis=1,
-)
-# From coefficients of powers of √c to those of Chebyshev polynomials in 2√c − 1.
-
-
-def light_glsl(peak: Array, rest: Array, whole: Spectrum) -> str:
+def light_glsl(raised: Curve, later: Curve, whole: Spectrum) -> str:
     """`raised` and `later` of an `Exchange` in GLSL, from its `numbers`."""
     return (
-        table("peak", peak)
-        + table("rest", rest)
+        table("roots", raised.roots)
+        + table("raised_values", raised.values)
+        + table("raised_slopes", raised.slopes)
+        + table("later_values", later.values)
+        + table("later_slopes", later.slopes)
         + spectrum("whole", whole)
         + """
 // h(c): by how much the base's lobe is raised.
 vec3 raised(float c) {
-    return inversesqrt(1.0 - clamp(coat_series(peak, c), 0.0, 0.999));
+    return coat_curve(roots, raised_values, raised_slopes, c);
 }
 
 // e(c): what leaves later, spread over all directions.
 vec3 later(float c) {
-    return max(coat_series(rest, c), 0.0);
+    return coat_curve(roots, later_values, later_slopes, c);
 }
 """
     )

@@ -3,7 +3,8 @@
 It changes no value itself.
 """
 
-from typing import ClassVar
+import dataclasses
+from typing import ClassVar, Self
 
 import equinox as eqx
 
@@ -37,6 +38,10 @@ class AbstractShown(AbstractBRDF):
     def isotropic(self) -> bool:
         """Where the base is, and level."""
         return self.level and self.base.isotropic
+
+    def widened(self, slope: Scalar) -> Self:
+        """With the base widened."""
+        return dataclasses.replace(self, base=self.base.widened(slope))  # pyright: ignore[reportCallIssue]
 
     def mirror(self, wi: Vec3) -> Spectrum:
         """That of the base."""

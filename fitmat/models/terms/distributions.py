@@ -44,6 +44,11 @@ class AbstractRoughness(AbstractShape):
         return jnp.minimum(*self.slopes)
 
 
+def added_slopes(alpha: Scalar, slope: Scalar) -> Scalar:
+    """As variances of slopes are."""
+    return jnp.minimum(jnp.sqrt(alpha**2 + slope**2), 1.0)
+
+
 class Isotropic(AbstractRoughness):
     """The same slope in all directions."""
 
@@ -59,6 +64,10 @@ class Isotropic(AbstractRoughness):
     def slopes(self) -> Slopes:
         """(alpha, alpha)."""
         return self.alpha, self.alpha
+
+    def widened(self, slope: Scalar) -> "Isotropic":
+        """√(α² + slope²), at most 1."""
+        return Isotropic(added_slopes(self.alpha, slope))
 
     def local(self, w: Vec3) -> Vec3:
         """The direction itself."""
@@ -96,6 +105,10 @@ class Anisotropic(AbstractRoughness):
     def slopes(self) -> Slopes:
         """(alpha_x, alpha_y)."""
         return self.alpha_x, self.alpha_y
+
+    def widened(self, slope: Scalar) -> "Anisotropic":
+        """√(α² + slope²), at most 1, along and across."""
+        return Anisotropic(added_slopes(self.alpha_x, slope), added_slopes(self.alpha_y, slope), self.rotation)
 
     def local(self, w: Vec3) -> Vec3:
         """The direction turned by −rotation about the normal."""

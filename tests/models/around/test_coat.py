@@ -15,11 +15,13 @@ import fitmat as fm
 from fitmat.errors import ModelError
 from fitmat.fitting.coordinates import coordinates
 from fitmat.models.albedo import albedo
-from fitmat.models.around.coat import RoughCoat, SmoothCoat, Varnish
+from fitmat.models.around.coat import RoughCoat, SmoothCoat
+from fitmat.models.around.face import face_albedo
+from fitmat.models.around.varnish import Varnish
 from fitmat.models.base import evaluate_pairs
 from fitmat.models.lobes.lambert import Lambert
 from fitmat.models.parameters import entries, vector, with_vector
-from fitmat.models.terms.fresnel import average_inside
+from fitmat.models.terms.fresnel import Dielectric, average_inside
 
 SINGLE = 1e-6
 """Relative; Mitsuba's single precision, a dozen operations of 6e-8; its approximation of R is divided out."""
@@ -191,7 +193,11 @@ def test_a_coat_of_air_is_the_base(hemisphere: Hemisphere, base: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["varnish-over-lambert+ggx", "rough-varnish-over-lambert", "varnish-over-rough-varnish-over-lambert"]
+    "name",
+    always(
+        {"rough-varnish-over-lambert"},
+        ["varnish-over-lambert+ggx", "rough-varnish-over-lambert", "varnish-over-rough-varnish-over-lambert"],
+    ),
 )
 def test_coats_are_reciprocal(hemisphere: Hemisphere, name: str) -> None:
     wi, wo, model = hemisphere(200, 5), hemisphere(200, 6), fm.model(name, depth=0.2)
@@ -200,9 +206,9 @@ def test_coats_are_reciprocal(hemisphere: Hemisphere, name: str) -> None:
 
 @pytest.mark.parametrize(("eta", "allowed"), [(1.001, FACE), (1.5, FACE), (3.0, FACE_DENSE)])
 def test_rough_face_reflects_what_visible_normals_do(eta: float, allowed: float) -> None:
-    """The mean of F G2/G1 over Heitz's visible normals on a fine grid."""
+    """The mean of F G2/G1 over Heitz's visible normals on a fine grid: what one facet reflects."""
     degrees = np.array([0.0, 45.0, 75.0, 85.0, 89.0])
-    reflectance = jax.jit(lambda alpha, cos: RoughCoat(jnp.array(eta), alpha, jnp.zeros(())).reflectance()(cos))
+    reflectance = jax.jit(lambda alpha, cos: face_albedo(alpha, Dielectric(jnp.array(eta)), "correlated")(cos))
     for alpha in (0.001, 0.03, 0.3, 1.0):
         expected = [ggx.albedo(theta, alpha, eta, 120) for theta in np.deg2rad(degrees)]
         ours = reflectance(jnp.array(alpha), jnp.cos(jnp.deg2rad(degrees)))
@@ -291,7 +297,8 @@ def test_gradients_are_finite_differences(hemisphere: Hemisphere, singular: Pair
 def test_plastic_is_a_rough_coat_over_lambert(hemisphere: Hemisphere) -> None:
     """Ks scales the face alone; without a face (eta 1) plastic is its body."""
     wi, wo = hemisphere(60, 15), hemisphere(60, 16)
-    plastic, face = fm.model("plastic", alpha=0.2, kd=0.4), fm.evaluate(fm.model("ggx", alpha=0.2), wi, wo)
+    plastic = fm.model("plastic", alpha=0.2, kd=0.4)
+    face = fm.evaluate(fm.model("plastic", alpha=0.2, kd=0.0), wi, wo)
     coated = fm.evaluate(fm.model("rough-varnish-over-lambert", alpha=0.2, kd=0.4), wi, wo)
     np.testing.assert_allclose(fm.evaluate(plastic, wi, wo), coated, rtol=EXACT)
     tripled = fm.evaluate(fm.model("plastic", alpha=0.2, kd=0.4, ks=3.0), wi, wo)

@@ -1,19 +1,21 @@
 """Coats over bases that mirror, against photons followed one by one, and what must hold at the ends of everything."""
 
+from types import ModuleType
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from oracles import coat_photons
+from oracles import coat_photons, mitsuba_slab
 from selection import always
 
 import fitmat as fm
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import from_angles
 from fitmat.models.albedo import albedo
-from fitmat.models.around.coat import RoughCoat, SmoothCoat, Varnish
+from fitmat.models.around.coat import RoughCoat, SmoothCoat
+from fitmat.models.around.varnish import Varnish
 from fitmat.models.base import AbstractBRDF, AbstractSpecular, evaluate_pairs
 from fitmat.models.laws import singular
 from fitmat.models.lobes.lambert import Lambert
@@ -25,8 +27,8 @@ from fitmat.models.terms.fresnel import AbstractFresnel, Schlick, White
 BIAS = 0.005
 """Absolute, of an albedo beside three standard errors: 10 + 5 cosines, 8 azimuths and 16 distances."""
 
-ROUGH_BIAS = 0.015
-"""Absolute; what a rough face reflects after several facets enters the body instead."""
+SHARE = 0.01
+"""Relative, where three standard errors are less: what the issue of coats asks for."""
 
 PHOTONS = 3000
 SEED = 20261129
@@ -35,6 +37,11 @@ SEED = 20261129
 def facets(alpha: float, f0: float) -> Microfacet:
     fresnel: AbstractFresnel = White() if f0 == 1.0 else Schlick(jnp.array(f0))
     return Microfacet(jnp.ones(()), Isotropic(jnp.array(alpha)), fresnel, GGX())
+
+
+def separable(alpha: float, share: float) -> Microfacet:
+    """Facets that all reflect the same share, with Mitsuba's masking."""
+    return Microfacet(jnp.array(share), Isotropic(jnp.array(alpha)), White(), GGX(), "separable")
 
 
 def varnished(base: AbstractBRDF, eta: float = 1.5, depth: float = 0.0) -> Varnish:
@@ -73,14 +80,43 @@ def test_coats_over_metals_keep_the_energy_that_photons_keep(f0: float, alpha: f
             assert abs(value - mean) < BIAS + 3 * error, np.rad2deg(angle)
 
 
-@pytest.mark.parametrize("alpha", always({0.3}, [0.1, 0.3, 1.0]))
-def test_rough_coats_keep_the_energy_that_photons_keep(alpha: float) -> None:
-    """Every order of reflection and refraction at the rough face, over a grey body."""
-    degrees = [0.0, 60.0, 80.0]
-    ours = reflected(rough(Lambert(jnp.array(0.5)), 1.5, alpha), degrees)
-    for angle, value in zip(np.deg2rad(degrees), ours, strict=True):
-        mean, error = coat_photons.rough_albedo(coat_photons.Lambert(0.5), angle, 1.5, alpha, count=PHOTONS, seed=SEED)
-        assert abs(value - mean) < ROUGH_BIAS + 3 * error, np.rad2deg(angle)
+UNDER = {
+    "grey": (Lambert(jnp.array(0.5)), coat_photons.Lambert(0.5)),
+    "metal": (facets(0.2, 0.73), coat_photons.Facets(0.2, coat_photons.schlick(0.73))),
+    "white": (facets(0.2, 1.0), coat_photons.Facets(0.2, coat_photons.schlick(1.0))),
+}
+
+FACES = [(0.1, 1.5, 0.0), (0.3, 1.5, 0.0), (1.0, 1.5, 0.0), (0.2, 1.42, 0.0), (0.65, 1.25, 0.1), (0.4, 1.8, 0.3)]
+"""(alpha, eta, depth): three of the table, and three between the points that were tabulated."""
+
+
+@pytest.mark.parametrize("base", always({"metal"}, UNDER))
+@pytest.mark.parametrize("face", always({(0.3, 1.5, 0.0)}, FACES))
+def test_rough_coats_keep_the_energy_that_photons_keep(base: str, face: tuple[float, float, float]) -> None:
+    """Every order of reflection and refraction at the rough face, over a grey body, a metal and white facets."""
+    degrees, (ours, theirs), (alpha, eta, depth) = [0.0, 60.0, 80.0], UNDER[base], face
+    found = reflected(rough(ours, eta, alpha, depth), degrees)
+    for angle, value in zip(np.deg2rad(degrees), found, strict=True):
+        mean, error = coat_photons.rough_albedo(theirs, angle, eta, alpha, depth=depth, count=4 * PHOTONS, seed=SEED)
+        assert abs(value - mean) < max(SHARE * mean, 3 * error), np.rad2deg(angle)
+
+
+SLABS: dict[str, tuple[AbstractBRDF, dict[str, Any]]] = {
+    "grey": (Lambert(jnp.array(0.5)), mitsuba_slab.DIFFUSE),
+    "white": (separable(0.2, 1.0), mitsuba_slab.facets(0.2, 1.0)),
+    "golden": (separable(0.5, 0.73), mitsuba_slab.facets(0.5, 0.73)),
+}
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("base", SLABS)
+def test_smooth_coats_reflect_what_mitsuba_traces_between_two_planes(mitsuba: ModuleType, base: str) -> None:
+    """A polished face over three bases, from four directions."""
+    degrees, (ours, theirs) = [0.0, 30.0, 60.0, 80.0], SLABS[base]
+    for angle, value in zip(np.deg2rad(degrees), reflected(varnished(ours), degrees), strict=True):
+        mean, error = mitsuba_slab.albedo(mitsuba, theirs, angle, 1.5, None, count=60 * PHOTONS, seed=SEED)
+        assert error < SHARE * mean / 3
+        assert abs(value - mean) < max(SHARE * mean, 3 * error), np.rad2deg(angle)
 
 
 PEAKS = {
@@ -134,6 +170,18 @@ def test_a_coat_over_what_keeps_all_keeps_all(base: str) -> None:
     np.testing.assert_allclose(reflected(varnished(KEEPING[base]), [0.0, 40.0, 75.0]), 1.0, atol=0.006)
 
 
+NARROW = [(1.05, 0.03), (1.05, 1.0), (2.5, 0.03)]
+"""(eta, alpha) where what a narrow lobe sends out through a rough face changes within few degrees."""
+
+
+@pytest.mark.parametrize("face", always({NARROW[0]}, NARROW))
+def test_narrow_white_facets_under_a_rough_face_keep_the_light_and_no_more(face: tuple[float, float]) -> None:
+    """Facets of slope 0.02 lose 0.001 up to 60° and 0.03 at 85°; a coat shows them at less grazing angles."""
+    found = reflected(rough(facets(0.02, 1.0), *face), [0.0, 17.0, 35.0, 51.0, 60.0, 75.0, 85.0])
+    assert (found < 1.0 + SHARE).all()
+    assert (found > 0.97).all()
+
+
 def test_the_mirror_image_of_a_coat_below_goes_back_and_forth() -> None:
     """Two polished faces over black, eta_1 then eta_2/eta_1 relative: F + T² p/(1 − p F), as two plates."""
     model, wi = varnished(varnished(Lambert(jnp.zeros(())), 1.4)), np.array([0.6, 0.0, 0.8])
@@ -163,6 +211,7 @@ ENDS: list[dict[str, float]] = [
 NESTED = varnished(rough(facets(0.2, 0.9), 1.3, 0.2, 0.1), depth=0.1)
 
 COATED = {
+    "rough over a metal": rough(facets(0.2, 0.9), 1.5, 0.2, 0.1),
     "smooth over a metal": varnished(facets(0.2, 0.9), depth=0.1),
     "smooth over rough over a metal": NESTED,
     "smooth over smooth over a metal": varnished(varnished(facets(0.2, 0.9)), 1.3),
