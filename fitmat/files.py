@@ -83,7 +83,7 @@ def new(target: Path, *, own: Callable[[Path], Sequence[str]], force: bool = Fal
             else:
                 _move_folder(draft, place)
         except OSError as error:
-            raise OutputError(f"cannot write {target}: {_reason(error)}; the report is not there.") from error
+            raise OutputError(f"cannot write {target}: {_reason(error)}; nothing was put there.") from error
 
 
 @contextlib.contextmanager

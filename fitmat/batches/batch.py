@@ -19,7 +19,8 @@ from fitmat.batches import rows, workers
 from fitmat.batches.jobs import Job, digest, every_file, from_table
 from fitmat.errors import FitmatError, OutputError
 from fitmat.reports import summary
-from fitmat.studies.plan import DEFAULT_MODELS, named, wants_all
+from fitmat.studies import DEFAULT_MODELS
+from fitmat.studies.plan import named, wants_all
 from fitmat.text import brief, visible
 
 TABLE, PAGE, PARTS = "results.parquet", "index.html", "parts"

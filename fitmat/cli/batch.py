@@ -18,7 +18,7 @@ from fitmat.batches.batch import PAGE, Batch, batch
 from fitmat.batches.textures import fit_texture
 from fitmat.cli import interrupts, process, session
 from fitmat.errors import FitmatError
-from fitmat.studies.plan import DEFAULT_MODELS
+from fitmat.studies import DEFAULT_MODELS
 from fitmat.text import visible
 
 TEXTURE = ("models", "loss", "masking", "fixed", "seed", "constants")

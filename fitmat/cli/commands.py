@@ -56,9 +56,10 @@ from fitmat.cli.flags.simulate import (
     ThetaIFlag,
     ThetaOFlag,
 )
+from fitmat.studies import DEFAULT_MODELS
 from fitmat.text import visible
 
-DEFAULT_MODELS = "lambert+blinn-phong,lambert+ggx"
+MODELS = ",".join(DEFAULT_MODELS)
 NOT_CONVERGED = 3
 
 
@@ -71,7 +72,7 @@ def fit(
     files: list[Path],
     reading: dict[str, Any],
     instrument: Any,
-    models: ModelsFlag = DEFAULT_MODELS,
+    models: ModelsFlag = MODELS,
     out: OutFlag = None,
     force: ForceFlag = False,
     json_: JsonFlag = False,
@@ -199,7 +200,7 @@ def design(
     files: list[Path],
     reading: dict[str, Any],
     instrument: Any,
-    models: ModelsFlag = DEFAULT_MODELS,
+    models: ModelsFlag = MODELS,
     for_: ForFlag = None,
     kind: KindFlag = "sample",
     count: CountFlag = 5,
@@ -265,7 +266,7 @@ def batch(
     files: SourcesFlag = None,
     out: BatchOutFlag = Path("fitmat-batch"),
     jobs: JobsFlag = None,
-    models: ModelsFlag = DEFAULT_MODELS,
+    models: ModelsFlag = MODELS,
     processes: ProcessesFlag = None,
     mcmc: McmcFlag = False,
     seed: SeedFlag = 0,

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.errors import FitmatError
+from fitmat import arguments
 
 FILE = Path(__file__).with_name("observers.npz")
 """`wavelength` in nm, (n,); the observers' colour-matching functions, (n, 3); the illuminants' relative power, (n,)."""
@@ -50,9 +50,8 @@ def seen(illuminant: str = "D65", observer: str = "2") -> Float[np.ndarray, "n 3
     Raises:
         FitmatError: either is not known.
     """
-    for what, name, known in (("illuminant", illuminant, ILLUMINANTS), ("observer", observer, OBSERVERS)):
-        if name not in known:
-            raise FitmatError(f"{what} {name!r} is not known; it is one of {', '.join(known)}.")
+    arguments.choice("illuminant", illuminant, ILLUMINANTS)
+    arguments.choice("observer", observer, OBSERVERS)
     products = _table(f"observer {observer}") * _table(illuminant)[:, None]
     return products / products[:, 1].sum()
 

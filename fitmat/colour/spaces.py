@@ -8,7 +8,7 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.errors import FitmatError
+from fitmat import arguments
 
 FROM_SRGB = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
 """Linear sRGB to XYZ, to the four digits of IEC 61966-2-1."""
@@ -75,8 +75,7 @@ def linear(xyz: Float[np.ndarray, "... 3"], space: str = "srgb") -> Float[np.nda
     Raises:
         FitmatError: the space is not known.
     """
-    if space not in SPACES:
-        raise FitmatError(f"colour space {space!r} is not known; it is one of {', '.join(SPACES)}.")
+    arguments.choice("space", space, SPACES)
     if space == "srgb":
         return xyz @ np.linalg.inv(FROM_SRGB).T
     found = SPACES[space]

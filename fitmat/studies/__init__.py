@@ -2,3 +2,6 @@
 
 What people see of it is made elsewhere.
 """
+
+DEFAULT_MODELS = ("lambert+blinn-phong", "lambert+ggx")
+"""The empirical and the microfacet model of a study that names none."""

@@ -19,9 +19,7 @@ from fitmat.measurements.samples import Measurements
 from fitmat.models import names as other_names
 from fitmat.models.parameters import entries
 from fitmat.models.registry import LOBES, lobe_names, model, normalised
-
-DEFAULT_MODELS = ("lambert+blinn-phong", "lambert+ggx")
-"""The empirical and the microfacet model of a study that names none."""
+from fitmat.studies import DEFAULT_MODELS
 
 EVERY = "all"
 """Asks for every model that makes sense for the measurements."""
@@ -65,7 +63,7 @@ def named(asked: str | Sequence[str]) -> list[str]:
         arguments.kind("one of models", part, str)
     names = [normalised(part) for part in parts if part.strip()]
     if not names:
-        raise ModelError("no model given; try --models lambert+blinn-phong,lambert+ggx.")
+        raise ModelError(f"no model given; try --models {','.join(DEFAULT_MODELS)}.")
     return list(dict.fromkeys(names))
 
 

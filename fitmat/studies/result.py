@@ -24,7 +24,7 @@ from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import entries, vector
 from fitmat.models.registry import LOBES, lobe_names
 from fitmat.models.registry import model as built
-from fitmat.text import brief
+from fitmat.text import brief, visible
 
 FORMAT = 1
 """Of the record; it grows when what an older one says would be misread."""
@@ -227,8 +227,12 @@ def _read(file: Path) -> dict[str, Any]:
         raise ReadError(f"{file} is no record of a run, expected what `fitmat fit` writes as {RECORD}.")
     if (got := found.get("format")) != FORMAT or isinstance(got, bool):
         which = "of no format" if got is None else f"of format {json.dumps(got)[:20]}"
-        by = str(found["fitmat"])[:20]
-        raise ReadError(f"{file} is {which}, by fitmat {by}, expected format {FORMAT}. Fit again with this version.")
+        by, command = visible(str(found["fitmat"])[:20]), found.get("command")
+        again = f": {visible(command)}" if isinstance(command, str) else "."
+        raise ReadError(
+            f"{file} was written by another version (fitmat {by}) and is {which}, expected format {FORMAT}. "
+            f"Fit the measurements again with this version{again}"
+        )
     return found
 
 

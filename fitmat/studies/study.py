@@ -28,10 +28,11 @@ from fitmat.measurements.large.stream import Stream
 from fitmat.measurements.reader import measurements_of
 from fitmat.measurements.samples import Measurements
 from fitmat.models.around.tilt import Tilted
+from fitmat.studies import DEFAULT_MODELS
 from fitmat.studies.advice import Advice, advise
 from fitmat.studies.findings import Findings, find
 from fitmat.studies.large import as_stream, counted, pass_over
-from fitmat.studies.plan import DEFAULT_MODELS, plan, refuse_unsampled
+from fitmat.studies.plan import plan, refuse_unsampled
 from fitmat.studies.sampling import sample_each
 from fitmat.text import brief
 from fitmat.uncertainty import second_sampler

@@ -275,7 +275,7 @@ def test_full_disk(run, tmp_path, monkeypatch, step):
 
     monkeypatch.setattr(os if step == "replace" else Path, step, refuse)
     ended = run("fit", DATA / "sparse.csv", *QUICK, "--out", tmp_path / "a" / "b")
-    assert_refused(ended, "cannot write .*: No space left on device; the report is not there")
+    assert_refused(ended, "cannot write .*: No space left on device; nothing was put there")
     assert [path for path in tmp_path.rglob("*") if path.is_file() or path.name.startswith(".")] == []
 
 

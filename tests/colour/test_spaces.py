@@ -54,5 +54,5 @@ def test_lightness_chroma_and_hue_are_those_that_ottosson_printed() -> None:
 
 
 def test_a_space_that_is_not_known_is_refused() -> None:
-    with pytest.raises(FitmatError, match="colour space 'adobe' is not known; it is one of srgb, p3, acescg"):
+    with pytest.raises(FitmatError, match="space is the text 'adobe', expected 'srgb' or 'p3' or"):
         spaces.linear(np.ones(3), "adobe")

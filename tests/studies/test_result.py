@@ -122,8 +122,11 @@ def test_a_file_of_measurements_is_to_be_fitted_first(tmp_path: Path) -> None:
 
 
 DAMAGES: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
-    "older": (lambda r: r.pop("format"), r"of no format, by fitmat 0\.1\.0, expected format 1\. Fit again"),
-    "later": (lambda r: r.update(format=2), "is of format 2, by fitmat"),
+    "older": (
+        lambda r: r.pop("format"),
+        r"by another version \(fitmat 0\.1\.0\) and is of no format, expected format 1\. Fit the measurements again",
+    ),
+    "later": (lambda r: r.update(format=2), "and is of format 2, expected"),
     "hostile format": (lambda r: r.update(format="\x1b[31m"), r"is of format \"\\u001b"),
     "no fits": (lambda r: r.pop("fits"), "is no record of a run, expected what `fitmat fit` writes"),
     "fits of numbers": (lambda r: r.update(fits=[1, 2]), r"is damaged \('int' object is not subscriptable\)"),
