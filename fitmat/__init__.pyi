@@ -30,6 +30,7 @@ from .fitting.fitting import fit as fit
 from .fitting.result import Fit as Fit
 from .fitting.many.fitting_many import fit_many as fit_many
 from .fitting.many.fits import Fits as Fits
+from .fitting.indices import indices as indices
 
 # Uncertainty
 from .uncertainty.laplace import laplace as laplace

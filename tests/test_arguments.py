@@ -225,6 +225,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             **KNOWN,
             "loss": (None, *TEXT, "lost"),
             "masking": (*TEXT, "mask"),
+            "dispersion": (*TEXT, "snell", "cauchy"),
             "max_steps": (0, *WHOLE),
         },
     ),
@@ -243,6 +244,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             "progress": CALLED,
         },
     ),
+    "indices": ({"fit": FIT}, {"fit": without(NOUN, fm.Fit)}),
     "laplace": ({"fit": FIT, "seed": 1}, {"fit": without(NOUN, fm.Fit), "seed": WHOLE, "corrected": FLAG}),
     "sample": (
         {"fit": FIT, "seed": 1},
@@ -327,6 +329,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             "loss": (None, *TEXT, "lost"),
             "masking": (*TEXT, "mask"),
             "ior": (*TEXT, "Unobtainium"),
+            "dispersion": (*TEXT, "snell", "cauchy"),
             **dict.fromkeys(("tilt", "sampling", "second_opinion", "full"), FLAG),
             "seed": WHOLE,
             "resume": FOLDER,

@@ -26,6 +26,7 @@ from fitmat.cli.flags.files import (
 )
 from fitmat.cli.flags.fitting import (
     CheckPosteriorFlag,
+    DispersionFlag,
     FixFlag,
     FullFlag,
     IorFlag,
@@ -86,6 +87,7 @@ def fit(
     check_posterior: CheckPosteriorFlag = False,
     ior: IorFlag = None,
     tilt: TiltFlag = False,
+    dispersion: DispersionFlag = None,
     full: FullFlag = False,
 ) -> None:
     """Fit models to a file of measurements and write a report with the Phong–microfacet match."""
@@ -99,7 +101,7 @@ def fit(
             from fitmat.cli import fit
 
             told = {"models": models, "loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
-            told |= fit.known(fix or [], prior or [])
+            told |= fit.known(fix or [], prior or []) | {"dispersion": dispersion}
             told |= {"sampling": not no_mcmc, "second_opinion": check_posterior, "full": full}
             done = fit.write_report(files, out, reading | {"instrument": instrument}, told, watch, force=force)
     done.tell(as_json=json_)
@@ -276,13 +278,14 @@ def batch(
     prior: PriorFlag = None,
     ior: IorFlag = None,
     tilt: TiltFlag = False,
+    dispersion: DispersionFlag = None,
 ) -> None:
     """Fit every file of a folder or a list, or every point of a texture, and write one table of all."""
     process.set_up()
     from fitmat.cli import batch, fit
 
     told = {"models": models, "loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
-    told |= {"sampling": mcmc} | fit.known(fix or [], prior or [])
+    told |= {"dispersion": dispersion, "sampling": mcmc} | fit.known(fix or [], prior or [])
     read = reading | {"instrument": instrument}
     if batch.is_texture(files or []):
         return batch.texture((files or [])[0], out, jobs, read, told, processes)

@@ -14,6 +14,7 @@ from fitmat import arguments
 from fitmat.errors import FitmatError, ModelError
 from fitmat.fitting.concluding import conclude
 from fitmat.fitting.coordinates import Coordinates, coordinates
+from fitmat.fitting.dispersed import dispersed
 from fitmat.fitting.ends import Ends, behind
 from fitmat.fitting.jitter import AGAIN, jittered
 from fitmat.fitting.likelihood import Data, first_discrepancy, prepare
@@ -43,6 +44,7 @@ def fit(
     priors: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
     loss: str = DEFAULT.name,
     masking: str | None = None,
+    dispersion: str | None = None,
     max_steps: int = MAX_STEPS,
 ) -> Fit:
     """Fit a model to measurements.
@@ -55,6 +57,8 @@ def fit(
             `fitmat.fitting.priors`.
         loss: What is minimised, by name (`fitmat.fitting.losses`); only a likelihood supports a posterior.
         masking: Static masking choice for the microfacet lobes of a named model.
+        dispersion: Law that the refractive index follows over the channels' wavelengths, "cauchy", "sellmeier",
+            "drude" or "drude-lorentz" (`fitmat.models.terms.dispersive`): its few parameters are fitted instead.
         max_steps: Levenberg–Marquardt iterations per start.
 
     Returns:
@@ -81,6 +85,9 @@ def fit(
             f"masking = {masking!r} beside a model, expected it with a name: a model has its own. Leave it out."
         )
     template = model(to, channels=channels, masking=masking) if isinstance(to, str) else to
+    arguments.kind("dispersion", dispersion, str, optional=True)
+    if dispersion is not None:
+        template = dispersed(template, dispersion, measurements.channels)
     chosen = find_loss(loss)
     shown = seen(template, measurements)
     known = dict(priors or {})

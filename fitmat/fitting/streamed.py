@@ -114,6 +114,7 @@ def fit_chunks(
     fixed: Mapping[str, ArrayLike] | None = None,
     priors: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
     masking: str | None = None,
+    dispersion: str | None = None,
     progress: Progress | None = None,
 ) -> Fit:
     """Fit a model to a large file.
@@ -127,6 +128,7 @@ def fit_chunks(
         fixed: Parameters to hold, by name: `{"ks": 1.0}`.
         priors: What is known beforehand, by name, as in `fitting.fit`.
         masking: Static masking choice for the microfacet lobes of a named model.
+        dispersion: As in `fitting.fit`.
         progress: Called after each chunk of each pass.
 
     Returns:
@@ -136,7 +138,8 @@ def fit_chunks(
         FitmatError: as `fitting.fit`, and ReadError where the file changed since `scan`.
     """
     every = chunks if isinstance(chunks, Rows) else rows(chunks, progress)
-    return fit_from(every, fit_part(every, to, fixed=fixed, priors=priors, masking=masking), progress)
+    told = {"fixed": fixed, "priors": priors, "masking": masking, "dispersion": dispersion}
+    return fit_from(every, fit_part(every, to, **told), progress)
 
 
 def fit_part(
@@ -146,6 +149,7 @@ def fit_part(
     fixed: Mapping[str, ArrayLike] | None = None,
     priors: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
     masking: str | None = None,
+    dispersion: str | None = None,
 ) -> Fit:
     """The fit of the part, with the noise that all rows show; as `fit_chunks`."""
     part = every.chunks.part
@@ -155,7 +159,8 @@ def fit_part(
         )
         raise ModelError(f"{got} rows, expected few enough to be fitted at once. Leave it out, or take fewer rows.")
     noise = every.known.of_part(part)
-    start = fitting.fit(dataclasses.replace(part, sigma=noise.sigma), to, fixed=fixed, priors=priors, masking=masking)
+    told = {"fixed": fixed, "priors": priors, "masking": masking, "dispersion": dispersion}
+    start = fitting.fit(dataclasses.replace(part, sigma=noise.sigma), to, **told)
     return dataclasses.replace(start, measurements=part, noise=noise)
 
 

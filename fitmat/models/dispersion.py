@@ -1,6 +1,6 @@
-"""Dispersion: n and k of a dataset as functions of the wavelength, and the datasets that come with fitmat.
+"""Dispersion: n and k as functions of the wavelength: the formulas of the literature, and the datasets of fitmat.
 
-Tables and the formulas of the literature as refractiveindex.info holds them; nothing is fitted, nothing extrapolated.
+Tables and formulas as refractiveindex.info holds them; nothing is fitted, nothing extrapolated.
 """
 
 import dataclasses
@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Complex, Float
+
+from fitmat.maths.arrays import library
 
 FILE = Path(__file__).with_name("refractive_indices.json")
 """Dataset → its parts: tables over µm, and formulas with the range in µm where they hold; `benchmarks/indices.py`."""
@@ -42,19 +44,47 @@ class Dispersion:
         return np.asarray(self.n(nm) + 1j * kappa)
 
 
-def sellmeier(um: np.ndarray, first: float, pairs: Sequence[tuple[float, float]]) -> np.ndarray:
-    """n² = 1 + A + Σ B λ²/(λ² − C²)."""
-    return np.sqrt(1.0 + first + sum(b * um**2 / (um**2 - c**2) for b, c in pairs))
+def sellmeier(um: np.ndarray, first: Any, pairs: Sequence[tuple[Any, Any]]) -> Any:
+    """n² = 1 + A + Σ B λ²/(λ² − C²) (W. Sellmeier, Ann. Phys. 219, 272, 1871)."""
+    return (1.0 + first + sum(b * um**2 / (um**2 - c**2) for b, c in pairs)) ** 0.5
 
 
-def sellmeier_2(um: np.ndarray, first: float, pairs: Sequence[tuple[float, float]]) -> np.ndarray:
+def sellmeier_2(um: np.ndarray, first: Any, pairs: Sequence[tuple[Any, Any]]) -> Any:
     """n² = 1 + A + Σ B λ²/(λ² − C)."""
-    return np.sqrt(1.0 + first + sum(b * um**2 / (um**2 - c) for b, c in pairs))
+    return (1.0 + first + sum(b * um**2 / (um**2 - c) for b, c in pairs)) ** 0.5
 
 
-def cauchy(um: np.ndarray, first: float, pairs: Sequence[tuple[float, float]]) -> np.ndarray:
-    """N = A + Σ B λ^C."""
-    return np.asarray(first + sum(b * um**c for b, c in pairs))
+def cauchy(um: np.ndarray, first: Any, pairs: Sequence[tuple[Any, Any]]) -> Any:
+    """N = A + Σ B λ^C (A. L. Cauchy, Mémoire sur la dispersion de la lumière, 1836)."""
+    return first + sum(b * um**c for b, c in pairs)
+
+
+def drude_lorentz(um: np.ndarray, first: Any, oscillators: Sequence[tuple[Any, Any, Any]]) -> tuple[Any, Any]:
+    """η and κ of ε = A + Σ Ω²/(E_j² − E² − iEΓ), E = hc/λ; free electrons are the term of E_j = 0.
+
+    P. Drude, Ann. Phys. 306, 566 (1900), and H. A. Lorentz, The theory of electrons (1909), as A. D. Rakić et al.,
+    Appl. Opt. 37, 5271 (1998), eqs. 1–3, write them (with the conjugate, for waves e^{+iωt}), where Ω² = f ω_p².
+
+    Args:
+        um: Wavelength in vacuum, µm.
+        first: ε far above all resonances that are written out; 1 where all are.
+        oscillators: Ω, E_j and Γ of each, eV.
+    """
+    energy = EV_UM / um
+    real, imaginary = first, 0.0
+    for strength, resonance, width in oscillators:
+        away, loss = resonance**2 - energy**2, energy * width
+        share = strength**2 / (away**2 + loss**2)
+        real, imaginary = real + share * away, imaginary + share * loss
+    # The root without cancellation: of a metal ε is near the negative axis, of a dielectric near the positive one.
+    xp = library(real, imaginary)
+    larger = (0.5 * ((real**2 + imaginary**2) ** 0.5 + abs(real))) ** 0.5
+    smaller = 0.5 * imaginary / larger
+    return xp.where(real < 0.0, smaller, larger), xp.where(real < 0.0, larger, smaller)
+
+
+EV_UM = 1.2398419843320026
+"""hc, in eV µm (exact in the SI of 2019)."""
 
 
 def gas(um: np.ndarray, first: float, pairs: Sequence[tuple[float, float]]) -> np.ndarray:
@@ -88,7 +118,7 @@ def _dispersion(parts: Sequence[dict[str, Any]]) -> Dispersion:
 def _formula(part: dict[str, Any]) -> dict[str, Curve]:
     first, *rest = part["coefficients"]
     pairs = list(zip(rest[::2], rest[1::2], strict=True))
-    return {"n": lambda nm: FORMULAS[part["formula"]](1e-3 * nm, first, pairs)}
+    return {"n": lambda nm: np.asarray(FORMULAS[part["formula"]](1e-3 * nm, first, pairs))}
 
 
 def _tables(part: dict[str, Any]) -> dict[str, Curve]:

@@ -4,6 +4,7 @@ This room knows nothing of reflection and fits nothing.
 """
 
 import dataclasses
+from abc import abstractmethod
 from collections.abc import Container, Sequence
 from typing import Any, Literal, TypeVar
 
@@ -106,7 +107,7 @@ def _walk(module: Any, owner: str) -> list[tuple[str, str, Param, tuple[int, ...
     found = []
     for field in dataclasses.fields(module):
         value = getattr(module, field.name)
-        if "param" in field.metadata and value is None:
+        if field.metadata.get("static") or ("param" in field.metadata and value is None):
             continue
         if "param" in field.metadata:
             found.append((owner, field.name, field.metadata["param"], np.shape(value)))
@@ -152,6 +153,14 @@ def with_vector(model: M, values: Any) -> M:
     return jax.tree.unflatten(structure, parts)
 
 
+class AbstractOfChannels(eqx.Module):
+    """A part of a model that knows more of its channels than the parameters say, as their wavelengths."""
+
+    @abstractmethod
+    def of_channels(self, which: np.ndarray) -> "AbstractOfChannels":
+        """The same of some of them."""
+
+
 def of_channels(model: M, which: np.ndarray, channels: int) -> M:
     """The same model of some of its channels.
 
@@ -160,7 +169,13 @@ def of_channels(model: M, which: np.ndarray, channels: int) -> M:
         which: Their positions.
         channels: How many there are.
     """
-    return jax.tree.map(lambda leaf: leaf[which] if np.shape(leaf) == (channels,) else leaf, model)
+
+    def chosen(part: Any) -> Any:
+        if isinstance(part, AbstractOfChannels):
+            return part.of_channels(which)
+        return part[which] if np.shape(part) == (channels,) else part
+
+    return jax.tree.map(chosen, model, is_leaf=lambda part: isinstance(part, AbstractOfChannels))
 
 
 def bounds(model: eqx.Module) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, " p"]]:

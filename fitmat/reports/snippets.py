@@ -22,6 +22,8 @@ def snippets(fit: Record) -> list[tuple[str, str]]:
     Args:
         fit: One of the record's `fits`.
     """
+    if fit.get("dispersion") is not None:  # whose index a model by name does not have
+        return []
     own = {key for part in lobe_names(fit["model"]) for key in LOBES[part].defaults()}
     told = {name: q["value"] for name, q in fit["parameters"].items() if name.rpartition(".")[2] in own}
     if not told or any(v is None for value in told.values() for v in _listed(value)):

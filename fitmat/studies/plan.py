@@ -11,6 +11,7 @@ import numpy as np
 from fitmat import arguments
 from fitmat.errors import ModelError
 from fitmat.fitting import known
+from fitmat.fitting.dispersed import carrying, dispersed
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.losses import loss as find_loss
 from fitmat.fitting.priors import DISCREPANCY, refuse_idle
@@ -77,6 +78,7 @@ def plan(
     masking: str | None = None,
     ior: str | None = None,
     tilt: bool = False,
+    dispersion: str | None = None,
 ) -> Jobs:
     """What `fit` is to be told of each model.
 
@@ -89,13 +91,20 @@ def plan(
         masking: Of the microfacet lobes; None for the models' own.
         ior: Material whose refractive index is held in the models that have one.
         tilt: Whether the sample's normal may lean.
+        dispersion: Law of the refractive index in the models that have one.
 
     Raises:
         ModelError: a name is unknown, something given concerns no model, or two things given contradict each other.
     """
     names = model_names(asked, measurements)
+    if dispersion is not None:
+        names = _with_law(names, dispersion, ior)
     prepared = known.prepare_known(names, measurements, ior=ior, tilt=tilt)
+    lawful = [name for name in prepared if dispersion is not None and carrying(name, dispersion)]
     having = {name: {e.name for e in entries(model(name))} | _BESIDE for name in prepared}
+    for name in lawful:
+        built = dispersed(model(name), dispersion or "", measurements.channels)
+        having[name] = {e.name for e in entries(built)} | _BESIDE
     own = {name: other_names.own(name, has - _BESIDE, fixed or {}) for name, has in having.items()}
     read = {key for found in own.values() for key in (fixed or {}) if key not in found}
     unread = {key: value for key, value in (fixed or {}).items() if key not in read}
@@ -112,6 +121,7 @@ def plan(
             "priors": _of(priors, having[name]),
             "loss": loss,
             **({"masking": masking} if masking is not None and name in masked else {}),
+            **({"dispersion": dispersion} if name in lawful else {}),
         }
         for name, held in prepared.items()
     }
@@ -139,6 +149,19 @@ def refuse_unsampled(count: int, most: int, loss: str, *, sampling: bool) -> Non
         raise ModelError(f"{asked} under the loss {loss} (--loss), which is no likelihood, {expected}")
     if count > most:
         raise ModelError(f"{asked} on {count:,} values, expected at most {most:,}, which are sampled. Leave it out.")
+
+
+def _with_law(names: Sequence[str], law: str, ior: str | None) -> list[str]:
+    """The models as they call themselves where their index follows a law."""
+    if ior is not None:
+        raise ModelError(
+            f"--dispersion {law} beside --ior {ior}, expected one of the two: the material says its index already. "
+            "Leave one out."
+        )
+    found = {name: carrying(name, law) for name in names}
+    if not any(found.values()):
+        raise ModelError(f"--dispersion {law}: none of {', '.join(names)} has an index that could follow it; use ggx.")
+    return list(dict.fromkeys(new or name for name, new in found.items()))
 
 
 def _of(given: Mapping[str, Any] | None, names: set[str]) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from fitmat.fitting.concluding import RESULTS
+from fitmat.fitting.dispersed import law_of
 from fitmat.fitting.quantities import UNDETERMINED, Quantity
 from fitmat.fitting.result import Fit
 from fitmat.judgement.budget import ALBEDO_DEG, COVERAGE, SOURCES, Budget, Line
@@ -88,6 +89,7 @@ def fit_dict(found: Findings) -> dict[str, Any]:
     return {
         "model": fit.name,
         "masking": masking(fit.model),
+        "dispersion": law_of(fit.model),
         "result": fit.result,
         "result_means": RESULTS[fit.result],
         "adequacy": fit.adequacy,

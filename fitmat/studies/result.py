@@ -19,9 +19,10 @@ from jaxtyping import Float
 from fitmat import arguments
 from fitmat.errors import ModelError, ReadError
 from fitmat.fitting.coordinates import channel_names
+from fitmat.fitting.dispersed import dispersed
 from fitmat.fitting.quantities import Quantity, dataframe, named
 from fitmat.models.base import AbstractBRDF
-from fitmat.models.parameters import entries, vector
+from fitmat.models.parameters import entries, vector, with_vector
 from fitmat.models.registry import LOBES, lobe_names
 from fitmat.models.registry import model as built
 from fitmat.text import brief, visible
@@ -246,6 +247,10 @@ def _fits(record: Mapping[str, Any], folder: Path) -> Iterator[Fitted]:
         if any(one is None for value in values.values() for one in np.ravel(np.array(value, object))):
             continue
         model = built(name, masking=fit["masking"], **values)
+        if (law := fit.get("dispersion")) is not None:
+            model = dispersed(model, law, channels)
+            numbers = [np.ravel(told[e.name]["value"]) for e in entries(model) if e.name in told]
+            model = with_vector(model, np.concatenate(numbers).astype(float))
         if missing := [entry.name for entry in entries(model) if entry.name not in told]:
             raise ValueError(f"no value of {missing[0]}")
         meant = {entry.name: entry.param.doc for entry in entries(model)}

@@ -167,3 +167,26 @@ def test_a_model_of_as_many_channels_as_it_is_written_for_is_not_divided() -> No
     assert not divides(model, 8)
     assert not divides(fm.model("lambert", channels=4), 4)
     assert not divides(fm.model("disney-2012", channels=8), 8)
+
+
+def test_of_many_channels_fewer_rows_stand_for_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The slopes that are held stay within their limit; what they count for is what was fitted."""
+    found = fm.fit(plastic(8), "lambert+ggx")
+    monkeypatch.setattr(linear, "MOST", 8 * 18 * 16)
+    few = found.linear
+    assert few is not None
+    assert few.slopes.shape == (16, 8, 18)
+    assert few.more == pytest.approx(found.n_values / np.count_nonzero(few.used))
+
+
+def test_negative_values_of_some_bands_are_noise() -> None:
+    """As a dark band of a noisy instrument has them: nothing is left out, and the band's kd comes near 0."""
+    m = plastic(8)
+    value = np.array(m.value)
+    value[:, 0] = 1e-3 * np.random.default_rng(1).standard_normal(len(value))
+    sigma = np.full_like(value, 1e-3)
+    told: dict[str, Any] = {"phi": m.phi, "sigma": sigma, "channels": m.channels}
+    found = fm.fit(fm.from_arrays(m.theta_i, m.theta_o, value, **told), "lambert+ggx")
+    assert found.n_values == m.value.size
+    assert found["kd"].value[0] < 2e-3
+    assert found["ks"].value[0] < 2e-3

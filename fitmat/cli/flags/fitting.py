@@ -80,6 +80,16 @@ IorFlag = Annotated[
     ),
 ]
 
+DispersionFlag = Annotated[
+    str | None,
+    typer.Option(
+        help="Law of the refractive index over the channels' wavelengths, whose few parameters are fitted instead of "
+        "one index a channel: cauchy or sellmeier (plastic, glass), drude or drude-lorentz (metal).",
+        metavar="LAW",
+        show_default=False,
+    ),
+]
+
 TiltFlag = Annotated[
     bool, typer.Option("--tilt", help="Fit how far the sample's normal leans in its mount, with every model.")
 ]
