@@ -18,6 +18,9 @@ from fitmat.maths.least_squares import RTOL, Normal, relative_offset
 from fitmat.maths.levenberg_marquardt import LevenbergMarquardt
 from fitmat.maths.programs import program_run_often
 
+TOLERANCE = 1e-2 * RTOL
+"""Of the steps: a hundredth of a single fit's, so that what is between the two is mostly that one's last step."""
+
 NEWTON = 3
 """Newton steps of the discrepancy between two bursts: all bursts together settle it."""
 
@@ -200,7 +203,7 @@ class _Work(NamedTuple):
 
 
 def _solver() -> LevenbergMarquardt:
-    return LevenbergMarquardt(rtol=RTOL, atol=RTOL, limit=None)
+    return LevenbergMarquardt(rtol=TOLERANCE, atol=TOLERANCE, limit=None)
 
 
 def _begun_again(state: Any, u: Array, which: Bool[Array, " B"], damping: Any) -> Any:
