@@ -3,6 +3,8 @@
 It finds no optimum and names no outcome.
 """
 
+from collections.abc import Callable
+
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
@@ -29,40 +31,48 @@ DIFFERENCE = 3e-4
 """Steps of the finite differences in standard deviations: errors of 1e-8 from curvature and from rounding."""
 
 AT_ONCE = 16
-"""Points for which the program of `normal_equations_at` is compiled."""
+"""Points for which the program of `normal_equations_of` is compiled."""
 
 
-def normal_equations_at(
-    template: AbstractBRDF, data: Data, points: Float[np.ndarray, "m p"], s: float
-) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, "m p"], Float[np.ndarray, "m p p"]]:
+Equations = Callable[[Float[np.ndarray, "m p"]], tuple[np.ndarray, np.ndarray, np.ndarray]]
+"""Natural coordinates of all parameters, (m, p), to Σ residual², (m,), Jᵀr, (m, p), and JᵀJ, (m, p, p)."""
+
+
+def normal_equations_of(template: AbstractBRDF, data: Data, s: float) -> Equations:
     """Σ residual², Jᵀr and JᵀJ in the natural coordinates of all parameters, the prior's rows included.
 
     Args:
         template: Gives shapes, bounds and static choices.
         data: The samples.
-        points: Natural coordinates.
         s: Discrepancy.
     """
-    every, found = coordinates(template), []
+    every = coordinates(template)
     of = layout(template, every, data.x.shape[1])
-    for part in slices(len(points), AT_ONCE):
-        size = part.stop - part.start
-        filled = np.concatenate([points[part], np.repeat(points[part][:1], AT_ONCE - size, axis=0)])
-        some = _normal_equations(template, data, filled, np.asarray(float(s)), np.array(size), every, of)
-        found.append([np.asarray(one)[:size] for one in some])
-    square, slope, gram = (np.concatenate(one) for one in zip(*found, strict=True))
-    return square, slope, gram
+    example = np.zeros((AT_ONCE, every.count))
+    run = _normal_equations.bound((template, every, of, data, np.asarray(float(s))), example, np.array(1))
+
+    def at(points: Float[np.ndarray, "m p"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        found = []
+        for part in slices(len(points), AT_ONCE):
+            size = part.stop - part.start
+            filled = example.copy()
+            filled[:size] = points[part]
+            found.append([np.asarray(one)[:size] for one in run(filled, np.array(size))])
+        square, slope, gram = (np.concatenate(one) for one in zip(*found, strict=True))
+        return square, slope, gram
+
+    return at
 
 
 @program
 def _normal_equations(
     template: AbstractBRDF,
-    data: Data,
-    points: ArrayLike,
-    s: ArrayLike,
-    count: ArrayLike,
     every: Coordinates,
     of: Layout | None,
+    data: Data,
+    s: ArrayLike,
+    points: ArrayLike,
+    count: ArrayLike,
 ) -> tuple[Array, Array, Array]:
     base = vector(template)
 
@@ -77,7 +87,7 @@ def _normal_equations(
 
 def expected_information(best: AbstractBRDF, data: Data, s: float) -> Float[np.ndarray, "p p"]:
     """JᵀJ in natural coordinates."""
-    return normal_equations_at(best, data, coordinates(best).natural(vector(best))[None], s)[2][0]
+    return normal_equations_of(best, data, s)(coordinates(best).natural(np.asarray(vector(best)))[None])[2][0]
 
 
 def observed_information(best: AbstractBRDF, data: Data, s: float, expected: np.ndarray) -> Float[np.ndarray, "p p"]:
@@ -96,7 +106,7 @@ def observed_information(best: AbstractBRDF, data: Data, s: float, expected: np.
     h = DIFFERENCE * np.minimum(sd, every.span)
     shift = np.where(here - h < every.low, 1.0, np.where(here + h > every.high, -1.0, 0.0))
     points = here + np.concatenate([np.diag(h * (shift + side)) for side in (-1.0, 0.0, 1.0)])
-    before, middle, after = normal_equations_at(best, data, points, s)[1].reshape(3, count, count)
+    before, middle, after = normal_equations_of(best, data, s)(points)[1].reshape(3, count, count)
     slope = (after - before) / (2.0 * h[:, None])
     bend = (after - 2.0 * middle + before) / h[:, None]
     hessian = slope - shift[:, None] * bend  # of the parabola through the three, at the best point

@@ -76,12 +76,12 @@ class Fit:
 
     __repr__ = brief
 
-    @property
+    @functools.cached_property
     def entries(self) -> tuple[Entry, ...]:
         """The model's parameters, in the order of `values`."""
         return entries(self.model)
 
-    @property
+    @functools.cached_property
     def values(self) -> Float[np.ndarray, " p"]:
         """Best parameters, physical units."""
         return np.asarray(vector(self.model))

@@ -18,11 +18,14 @@ from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.parameters import vector, with_vector
 
 SMALL, LARGE = (32, 1024), (16, 16384)
-"""Draws and directions of the two blocks that are compiled; the large one is compiled only where it is filled by half.
+"""Draws and directions of the two blocks that are compiled; the large one where its directions are filled by half.
 
 A block takes 0.01–0.02 µs a value and 0.2 ms; a coat takes 0.2–1 ms a draw besides, however many directions
 follow. Draws that fill up a block cost nothing.
 """
+
+HELD = 2_000_000
+"""Values of a model that `blocks` holds at a time."""
 
 
 Draws = tuple[AbstractBRDF, Float[np.ndarray, "d p"]]
@@ -49,7 +52,7 @@ def values(
         >>> values(fm.model("lambert"), np.array([[np.pi / 4], [np.pi / 2]]), up, up).ravel()
         array([0.25, 0.5 ])
     """
-    most = _block_shape(len(draws), len(wi))
+    most = LARGE if len(wi) >= LARGE[1] // 2 else SMALL
     found = None
     for rows in slices(len(draws), most[0]):
         for places in slices(len(wi), most[1]):
@@ -82,7 +85,7 @@ def blocks(
     count = max(len(np.atleast_2d(w)) for w in pairs[0])
     for some in slices(len(pairs), max(1, LARGE[1] // count)):
         wi, wo = (np.concatenate([np.broadcast_to(pair[k], (count, 3)) for pair in pairs[some]]) for k in range(2))
-        for rows in slices(len(parts[0][1]), LARGE[0]):
+        for rows in slices(len(parts[0][1]), max(LARGE[0], HELD // len(wi))):
             found = [values(model, draws[rows], wi, wo) for model, draws in parts]
             for k in range(some.stop - some.start):
                 yield rows, some.start + k, [f[:, k * count : (k + 1) * count] for f in found]
@@ -104,10 +107,6 @@ def surfaces(model: AbstractBRDF, draws: Float[np.ndarray, "d p"]) -> Draws:
     return surface(model), draws[:, places]
 
 
-def _block_shape(draws: int, directions: int) -> tuple[int, int]:
-    return LARGE if draws >= LARGE[0] // 2 and directions >= LARGE[1] // 2 else SMALL
-
-
 def slices(count: int, most: int) -> Iterator[slice]:
     """Even parts of a number of things, each of at most so many."""
     ends = np.linspace(0, count, -(-count // most) + 1).astype(int).tolist()
@@ -116,7 +115,9 @@ def slices(count: int, most: int) -> Iterator[slice]:
 
 def _filled(part: np.ndarray, count: int) -> np.ndarray:
     """So many rows, the last one repeated."""
-    return np.pad(np.asarray(part, float), ((0, count - len(part)), (0, 0)), mode="edge")
+    filled = np.empty((count, part.shape[1]))
+    filled[: len(part)], filled[len(part) :] = part, part[-1:]
+    return filled
 
 
 @program_run_often

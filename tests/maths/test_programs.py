@@ -274,8 +274,8 @@ def test_tuples_and_static_coordinates(place: Path, traced: list[str]) -> None:
     for moved in (coordinates(model), coordinates(model, {"kd": 0.3})):
         lower, upper = moved.low, moved.high
         points = lower + np.array([[0.3], [0.6]]) * (upper - lower)
-        found = Program(function)(model, data, points, s, count, moved, None)
-        expected: Any = function(model, data, points, s, count, moved, None)
+        found = Program(function)(model, moved, None, data, s, points, count)
+        expected: Any = function(model, moved, None, data, s, points, count)
         assert isinstance(found, tuple)
         for part, wanted, shape in zip(found, expected, [(), (moved.count,), (moved.count,) * 2], strict=True):
             assert part.shape == (2, *shape)

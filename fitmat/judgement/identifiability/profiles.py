@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.fitting.coordinates import coordinates
-from fitmat.fitting.information import inverse_information, normal_equations_at
+from fitmat.fitting.information import inverse_information, normal_equations_of
 from fitmat.fitting.likelihood import Data
 from fitmat.fitting.result import Fit
 from fitmat.maths.normal import Z95
@@ -163,22 +163,25 @@ class _Surface:
         best: The fit's own, kept within the bounds, (f,).
         low: Bounds as seen from there, (f,).
         high: The others.
+        span: Widths of the bounds, (f,).
         gram: JᵀJ there, (f, f).
     """
 
     def __init__(self, fit: Fit, widened: bool) -> None:
-        self._fit, self._data, self._moved = fit, representative(fit), fit.coordinates
-        self.best = np.clip(self._moved.natural(fit.values), self._moved.low, self._moved.high)
-        self.low, self.high = self._moved.around(self.best)
-        self._back = np.linalg.inv(fit.correlation.stretch) if widened else np.eye(self._moved.count)
+        moved, every = fit.coordinates, coordinates(fit.model)
+        self.best, self.span = np.clip(moved.natural(fit.values), moved.low, moved.high), moved.span
+        self.low, self.high = moved.around(self.best)
+        self._natural, self._free = every.natural(fit.values), fit.free
+        self._equations = normal_equations_of(fit.model, representative(fit), fit.discrepancy)
+        self._back = np.linalg.inv(fit.correlation.stretch) if widened else np.eye(moved.count)
         square, _, gram = self._at(self.best[None])
         self._square, self.gram = square[0], gram[0]
 
     def _at(self, t: Float[np.ndarray, "m f"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         t = np.clip(self.best + (t - self.best) @ self._back.T, self.low, self.high)
-        values, free = self._moved.filled(self._fit.values, t), self._fit.free
-        natural = coordinates(self._fit.model).natural(values)
-        square, slope, gram = normal_equations_at(self._fit.model, self._data, natural, self._fit.discrepancy)
+        natural, free = np.tile(self._natural, (len(t), 1)), self._free
+        natural[:, free] = t
+        square, slope, gram = self._equations(natural)
         return square, slope[:, free] @ self._back, self._back.T @ gram[:, free[:, None], free] @ self._back
 
     def settled(self, t: Float[np.ndarray, "m f"], held: np.ndarray) -> Points:
@@ -186,7 +189,7 @@ class _Surface:
 
         Levenberg–Marquardt for all points together, projected onto the bounds (Bertsekas 1982).
         """
-        each, span = np.arange(len(t)), self._moved.span
+        each, span = np.arange(len(t)), self.span
         low, high = self.low, self.high
         square, slope, gram = self._at(t)
         damping, moving = np.full(len(t), 1e-6), np.ones(len(t), bool)
