@@ -70,7 +70,7 @@ def row(match: Match) -> dict[str, float]:
     return {
         "distance": match.hemisphere_distance.value,
         "measured": match.measured_distance.value,
-        "cube": match.cube_root_distance.value,
+        "cube": match.distances.whole["cube-root"].value,
         "mean": seen.delta_e_2000.mean.value,
         "worst": seen.delta_e_2000.worst_twentieth.value,
         "gap": match.albedo_gap_sign * match.albedo_gap_max.value,

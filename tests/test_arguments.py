@@ -307,7 +307,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
         {
             "one": without(NOUN, fm.Fit),
             "other": without(NOUN, fm.Fit),
-            **dict.fromkeys(("spheres", "imitations", "pictures"), FLAG),
+            **dict.fromkeys(("spheres", "imitations", "pictures", "short"), FLAG),
         },
     ),
     "imitate": (
@@ -330,7 +330,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             "masking": (*TEXT, "mask"),
             "ior": (*TEXT, "Unobtainium"),
             "dispersion": (*TEXT, "snell", "cauchy"),
-            **dict.fromkeys(("tilt", "sampling", "second_opinion", "full"), FLAG),
+            **dict.fromkeys(("tilt", "sampling", "second_opinion", "full", "short"), FLAG),
             "seed": WHOLE,
             "resume": FOLDER,
             "progress": CALLED,

@@ -26,8 +26,8 @@ DIED = "its process died, also when it was tried alone: it was killed, or there 
 TRIES = 3
 """How often a file is tried alone after its worker died, which may have been for another's sake."""
 
-ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "NPROC": "1"}
-"""Environment of a worker, of BLAS and XLA: there are as many workers as cores."""
+ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NPROC", "POLARS_MAX_THREADS"), "1")
+"""Environment of a worker, of BLAS, XLA and polars: there are as many workers as cores."""
 
 Rows = list[dict[str, Any]]
 Work = Callable[[Job, str], Rows]
@@ -44,7 +44,7 @@ def studied(job: Job, content: str) -> Rows:
         measurements = read(job.path, **job.reading)
         if digest(job.path) != content:
             raise ReadError(f"{job.path} changed while it waited. Give the same command again.")
-        return rows.rows(study(measurements, **job.studying))
+        return rows.rows(study(measurements, **{"short": True, **job.studying}))
     except FitmatError as error:
         return rows.refused(error)
     except Exception as error:  # one file is not worth the others

@@ -33,6 +33,11 @@ class Colouring:
 
     __repr__ = brief
 
+    @property
+    def grey(self) -> bool:
+        """Whether whatever the values are they make a grey, so that the luminance Y says it all."""
+        return bool(np.allclose(self.weights, self.weights[:, 1:2] * FROM_SRGB.sum(axis=1)))
+
 
 def colouring(channels: tuple[str, ...]) -> Colouring:
     """The colour of each channel under D65, from its name.

@@ -69,6 +69,29 @@ def delta_e_itp(one: Float[np.ndarray, "... 3"], other: Float[np.ndarray, "... 3
     return itp(*(to_ictcp(xyz) for xyz in pairs))
 
 
+def greys_2000(one: Float[np.ndarray, "..."], other: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+    """CIEDE2000 of greys: without chroma only lightness is left, |ΔL′|/S_L.
+
+    Args:
+        one: Luminances, white Y = 1.
+        other: The same of the other greys.
+    """
+    lightness = [116.0 * _lightness_root(y) - 16.0 for y in (one, other)]
+    from_middle = ((lightness[0] + lightness[1]) / 2.0 - 50.0) ** 2
+    return np.abs(lightness[1] - lightness[0]) / (1.0 + 0.015 * from_middle / np.sqrt(20.0 + from_middle))
+
+
+def greys_itp(one: Float[np.ndarray, "..."], other: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+    """ΔE_ITP of greys: all cones respond alike, so that C_T = C_P = 0 and 720 |ΔI| is left.
+
+    Args:
+        one: Luminances, white Y = 1, which has `WHITE_LUMINANCE`; clipped as in `delta_e_itp`.
+        other: The same of the other greys.
+    """
+    first, second = (_quantised(np.clip(WHITE_LUMINANCE * y, 0.0, HIGHEST_LUMINANCE)) for y in (one, other))
+    return 720.0 * np.abs(second - first)
+
+
 def to_lab(xyz: Float[np.ndarray, "... 3"], white: Float[np.ndarray, "3"] = WHITE) -> Float[np.ndarray, "... 3"]:
     """CIE L*a*b* (CIE 15:2018, eqs. 8.3–8.11).
 
@@ -76,10 +99,13 @@ def to_lab(xyz: Float[np.ndarray, "... 3"], white: Float[np.ndarray, "3"] = WHIT
         xyz: CIE XYZ.
         white: XYZ of what counts as white, Y = 1; D65 unless told.
     """
-    ratio = xyz / white
-    f = np.where(ratio > (6 / 29) ** 3, np.cbrt(ratio), (29 / 6) ** 2 / 3 * ratio + 4 / 29)
+    f = _lightness_root(xyz / white)
     x, y, z = f[..., 0], f[..., 1], f[..., 2]
     return np.stack([116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)], axis=-1)
+
+
+def _lightness_root(ratio: np.ndarray) -> np.ndarray:
+    return np.where(ratio > (6 / 29) ** 3, np.cbrt(ratio), (29 / 6) ** 2 / 3 * ratio + 4 / 29)
 
 
 def ciede2000(one: Float[np.ndarray, "... 3"], other: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "..."]:

@@ -28,6 +28,7 @@ from fitmat.fitting.left_blocks import left_out, of_few, ranges
 from fitmat.fitting.likelihood import Data
 from fitmat.fitting.linear import Linear
 from fitmat.fitting.process import ASKED, Found, counted, find, independent, kernel
+from fitmat.maths.blas import one_thread
 from fitmat.maths.directions import zenith
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector
@@ -89,6 +90,7 @@ class Correlation:
         return f"{where}neighbouring angles share a misfit"
 
 
+@one_thread()
 def correlate(
     best: AbstractBRDF,
     data: Data,

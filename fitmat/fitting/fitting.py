@@ -26,6 +26,7 @@ from fitmat.fitting.refining import MAX_STEPS, ROUNDS, STARTS, confirmed, optima
 from fitmat.fitting.result import Fit
 from fitmat.fitting.seeing import seen
 from fitmat.fitting.starts import starting_points
+from fitmat.maths.blas import one_thread
 from fitmat.measurements.noise import measured_noise
 from fitmat.measurements.reader import measurements_of
 from fitmat.measurements.samples import Measurements
@@ -36,6 +37,7 @@ from fitmat.models.parameters import check_range, entries, vector, with_vector
 from fitmat.models.registry import model
 
 
+@one_thread()
 def fit(
     measurements: Measurements | str | os.PathLike[str],
     to: str | AbstractBRDF,

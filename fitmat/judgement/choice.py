@@ -5,6 +5,7 @@ best of them is good enough is for `predictive_check` to say.
 """
 
 import dataclasses
+import functools
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -46,7 +47,6 @@ class Candidate:
         behind: By how much its elpd is below the highest; NaN where it has none.
         behind_se: Standard error of that difference.
         left_out: Errors of whole incidences that were left out; None where there is only one.
-        broken: Laws that it breaks, in words.
         doubts: What else speaks against its parameters, in words.
     """
 
@@ -55,10 +55,14 @@ class Candidate:
     behind: float
     behind_se: float
     left_out: LeftOut | None
-    broken: tuple[str, ...]
     doubts: tuple[str, ...]
 
     __repr__ = brief
+
+    @functools.cached_property
+    def broken(self) -> tuple[str, ...]:
+        """Laws that it breaks, in words."""
+        return broken_laws(self.fit)
 
     @property
     def name(self) -> str:
@@ -269,8 +273,7 @@ def choose(posteriors: Sequence[Posterior], *, predicting: bool = True, singly: 
         if proof is not None and top is not None and np.isfinite(score):
             apart = top.pointwise - proof.pointwise
         error = float(np.sqrt(len(apart)) * apart.std())
-        against = broken_laws(fit), doubts(fit)
-        candidates.append(Candidate(posterior, proof, float(scores[best] - score), error, out, *against))
+        candidates.append(Candidate(posterior, proof, float(scores[best] - score), error, out, doubts(fit)))
     return Choice(tuple(sorted(candidates, key=_rank)))
 
 

@@ -13,8 +13,9 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat._types import Scalar, Spectrum, Vec3
-from fitmat.match.distances import ANGLES, PairedDraws, lobe_rules
+from fitmat.match.distances import ANGLES, PairedDraws
 from fitmat.match.regions import GRAZING_DEG
+from fitmat.maths.quadrature import lobe_rules
 from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, Sum
 from fitmat.models.conversion import exponent_from_alpha
@@ -37,6 +38,9 @@ TERMS = {
 
 NODES = (40, 16)
 """Of the quadrature over ω_o, in zenith and azimuth: falls are then right to 0.01."""
+
+GRAZING = ANGLES[np.deg2rad(GRAZING_DEG) < ANGLES]
+"""Incidences of which the verdict of a match says why light is missing."""
 
 EXPLAINS = 0.2
 """A term is named as the cause where the distance falls by at least this fraction without it."""
@@ -111,7 +115,7 @@ class Ablation:
         theta_i: Incidence, radians, (k,).
         distance: √(∫ (f_P − f_M)² c_o / ∫ f_M² c_o) at each incidence, rows low, best, high, (3, k).
         fall: Term of `TERMS` → fraction by which the distance falls without it, (3, k); negative where it grows.
-        near: The same over incidences up to `GRAZING_DEG`, weighted with cosθ_i sinθ_i.
+        near: The same over incidences up to `GRAZING_DEG`, weighted with cosθ_i sinθ_i; empty where none was asked.
         grazing: The same beyond.
     """
 
@@ -199,44 +203,55 @@ class Ablated(AbstractBRDF):
         return self.within.isotropic
 
 
-def ablate(empirical: AbstractBRDF, microfacet: AbstractBRDF, draws: PairedDraws) -> Ablation | None:
+def ablate(
+    empirical: AbstractBRDF,
+    microfacet: AbstractBRDF,
+    draws: PairedDraws,
+    theta_i: Float[np.ndarray, " k"] = ANGLES,
+) -> Ablation | None:
     """How far the distance falls when the microfacet model loses its terms; None where it has none to lose.
 
     Args:
         empirical: Its shapes and static choices.
         microfacet: The same.
         draws: Parameters of both, the best fits first, then draws.
+        theta_i: Incidences, radians, of `ANGLES`.
     """
     if not can_ablate(microfacet):
         return None
-    squares, norm = _squares(surfaces(empirical, draws[0]), surfaces(microfacet, draws[1]))
+    squares, norm = _squares(surfaces(empirical, draws[0]), surfaces(microfacet, draws[1]), theta_i)
 
     def falls(weight: np.ndarray) -> np.ndarray:
         """Of every draw and term, over incidences weighted by the columns of a matrix."""
         distance = np.sqrt(squares @ weight)
         return 1.0 - distance[:, 1:] / np.maximum(distance[:, :1], 1e-300)
 
-    each = falls(np.eye(len(ANGLES)))
-    light, far = np.cos(ANGLES) * np.sin(ANGLES), np.deg2rad(GRAZING_DEG) < ANGLES
-    near, grazing = (falls((light * part)[:, None])[..., 0] for part in (~far, far))
+    def over(part: np.ndarray) -> dict[str, Estimate]:
+        found = falls((light * part)[:, None])[..., 0] if part.any() else np.zeros((len(squares), 0))
+        return {term: estimate(found[:, k]) for k, term in enumerate(TERMS) if part.any()}
+
+    each = falls(np.eye(len(theta_i)))
+    light, far = np.cos(theta_i) * np.sin(theta_i), np.deg2rad(GRAZING_DEG) < theta_i
     return Ablation(
-        theta_i=ANGLES,
+        theta_i=theta_i,
         distance=band(np.sqrt(squares[:, 0] / norm)),
         fall={term: band(each[:, k]) for k, term in enumerate(TERMS)},
-        near={term: estimate(near[:, k]) for k, term in enumerate(TERMS)},
-        grazing={term: estimate(grazing[:, k]) for k, term in enumerate(TERMS)},
+        near=over(~far),
+        grazing=over(far),
     )
 
 
-def _squares(empirical: Draws, microfacet: Draws) -> tuple[Float[np.ndarray, "d t k"], Float[np.ndarray, "d k"]]:
+def _squares(
+    empirical: Draws, microfacet: Draws, theta_i: Float[np.ndarray, " k"]
+) -> tuple[Float[np.ndarray, "d t k"], Float[np.ndarray, "d k"]]:
     """∫ (f_P − f)² c_o of the whole microfacet model and without each term, and ∫ f_M² c_o, channel means."""
     model, draws = microfacet
     parts = [empirical, microfacet, (Ablated(model), draws)]
     isotropic = empirical[0].isotropic and model.isotropic
     narrowest = min(widths(*empirical).min(), widths(*microfacet).min())
-    rules = lobe_rules(ANGLES, narrowest, isotropic=isotropic, nodes=NODES)
-    turns = len(rules) // len(ANGLES)
-    squares, norm = np.zeros((len(draws), 1 + len(TERMS), len(ANGLES))), np.zeros((len(draws), len(ANGLES)))
+    rules, count = lobe_rules(theta_i, narrowest, isotropic=isotropic, nodes=NODES), len(theta_i)
+    turns = len(rules) // count
+    squares, norm = np.zeros((len(draws), 1 + len(TERMS), count)), np.zeros((len(draws), count))
     for rows, k, (f, whole, without) in blocks(parts, [(rule.wi, rule.wo) for rule in rules]):
         place, share = k // turns, rules[k].weight / turns
         without = without.reshape(*without.shape[:2], len(TERMS), -1)

@@ -4,6 +4,7 @@ It judges no distance and reads no measurements.
 """
 
 import dataclasses
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,15 +12,12 @@ from jaxtyping import Float
 
 from fitmat.match.regions import GRAZING_DEG, REGIONS, incidence_panels, memberships
 from fitmat.maths.arrays import library
-from fitmat.maths.quadrature import AZIMUTH_NODES, ZENITH_NODES, Rule, lobe_rule
+from fitmat.maths.quadrature import AZIMUTH_NODES, ZENITH_NODES, Rule, lobe_rules
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.metrics import METRICS, NGAN_DEG, Metric
 from fitmat.models.values import Draws, blocks, surfaces, widths
 from fitmat.text import brief
 from fitmat.uncertainty.estimate import Estimate, band, estimate
-
-AZIMUTHS = 4
-"""Azimuths of incidence over half a turn, where a model is anisotropic."""
 
 COARSE = (24, 12)
 """Nodes behind the spread of the draws; the best fits are integrated with all nodes."""
@@ -77,7 +75,11 @@ PairedDraws = tuple[Float[np.ndarray, "d p"], Float[np.ndarray, "d q"]]
 
 
 def measure_distances(
-    first: AbstractBRDF, second: AbstractBRDF, draws: PairedDraws, measured: Float[np.ndarray, " a"]
+    first: AbstractBRDF,
+    second: AbstractBRDF,
+    draws: PairedDraws,
+    measured: Float[np.ndarray, " a"],
+    metrics: Mapping[str, Metric] = METRICS,
 ) -> Distances:
     """Every distance of two models, with intervals over draws of their parameters.
 
@@ -86,6 +88,7 @@ def measure_distances(
         second: The same; its lobe, as wide as in the first row of `draws`, says where the regions are.
         draws: Parameters of both.
         measured: Incidence angles for `Distances.measured`, radians; beyond them a difference is known to a factor.
+        metrics: Those that are asked for, "relative" among them.
     """
     theta, solid = incidence_panels()
     nodes = np.concatenate([theta, measured, ANGLES])
@@ -93,30 +96,31 @@ def measure_distances(
     pair = surfaces(first, draws[0]), surfaces(second, draws[1])
     every = [widths(*part) for part in pair]
     of_lobe = min(w.min() for w in every), every[1][0]
-    best = _integrals(_first(pair), nodes, of_lobe, (ZENITH_NODES, AZIMUTH_NODES))
-    top, bottom, albedos = _spread_about(best, _integrals(pair, nodes, of_lobe, COARSE))
+    asked = tuple(metrics.values())
+    best = _integrals(_first(pair), nodes, of_lobe, (ZENITH_NODES, AZIMUTH_NODES), asked)
+    top, bottom, albedos = _spread_about(best, _integrals(pair, nodes, of_lobe, COARSE, asked))
     if not all(np.allclose(part, part[0], rtol=1e-9, atol=0.0) for part in draws):  # an objective has no intervals
-        top *= extrapolation(nodes, measured, len(top))[:, :, None, None] ** _POWERS[:, None]
-    result: dict[str, dict] = {key: {} for key in ("whole", "by_region", "share", "by_incidence", "both")}
-    wholes = {}
-    for k, (name, metric) in enumerate(METRICS.items()):
+        powers = np.array([1.0 if metric.kind == "light" else 2.0 for metric in asked])
+        top *= extrapolation(nodes, measured, len(top))[:, :, None, None] ** powers[:, None]
+    result: dict[str, dict] = {key: {} for key in ("draws", "whole", "by_region", "share", "by_incidence", "both")}
+    for k, (name, metric) in enumerate(metrics.items()):
         t, b = (part[:, over, k] * incidence_weight(metric, theta, solid)[:, None] for part in (top, bottom))
         t, b = t.sum(axis=1), b.sum(axis=1)
         spread, shares = _over_nodes(metric, t, b), t / np.maximum(t.sum(axis=1, keepdims=True), 1e-300)
-        wholes[name] = _over_nodes(metric, t.sum(axis=1), b.sum(axis=1))
-        result["whole"][name] = estimate(wholes[name])
+        result["draws"][name] = _over_nodes(metric, t.sum(axis=1), b.sum(axis=1))
+        result["whole"][name] = estimate(result["draws"][name])
         result["by_region"][name] = {region: estimate(spread[:, r]) for r, region in enumerate(REGIONS)}
         result["share"][name] = {region: estimate(shares[:, r]) for r, region in enumerate(REGIONS)}
         t, b = top[:, curves, k], bottom[:, curves, k]
         result["by_incidence"][name] = band(_at_node(metric, t.sum(axis=2), b.sum(axis=2), ANGLES))
         result["both"][name] = band(_at_node(metric, t, b, ANGLES[:, None]))
-    place = list(METRICS).index("relative")
+    place = list(metrics).index("relative")
     t, b = (part[:, at, place].sum(axis=2) @ np.cos(measured) for part in (top, bottom))
     light = albedos[:, over].transpose(2, 0, 1) @ np.where(theta > np.deg2rad(GRAZING_DEG), solid * np.cos(theta), 0.0)
     return Distances(
         theta_i=ANGLES,
         whole=result["whole"],
-        relative=wholes["relative"],
+        relative=result["draws"]["relative"],
         measured=estimate(_over_nodes(METRICS["relative"], t, b)),
         beyond=_beyond(top[0, over, place].sum(axis=1) * solid * np.cos(theta), theta, measured),
         by_region=result["by_region"],
@@ -176,9 +180,6 @@ def _at_node(metric: Metric, top: np.ndarray, bottom: np.ndarray, theta: np.ndar
     return kept * factor * _over_nodes(metric, top, bottom)
 
 
-_POWERS = np.array([1.0 if metric.kind == "light" else 2.0 for metric in METRICS.values()])
-"""Of the difference that the integrals of each metric hold."""
-
 Integrals = tuple[Float[np.ndarray, "d k m r"], Float[np.ndarray, "d k m r"], Float[np.ndarray, "d k 2"]]
 
 
@@ -205,7 +206,11 @@ def _spread_about(best: Integrals, draws: Integrals) -> Integrals:
 
 
 def _integrals(
-    pair: tuple[Draws, Draws], theta_i: Float[np.ndarray, " k"], of_lobe: tuple[float, float], nodes: tuple[int, int]
+    pair: tuple[Draws, Draws],
+    theta_i: Float[np.ndarray, " k"],
+    of_lobe: tuple[float, float],
+    nodes: tuple[int, int],
+    metrics: Sequence[Metric],
 ) -> Integrals:
     """∫ |t(f₁) − t(f₂)|ᵖ w and ∫ w (or ∫ f₂² w) over ω_o: draw, incidence, metric, region; and both albedos.
 
@@ -214,69 +219,50 @@ def _integrals(
         theta_i: Incidences in radians.
         of_lobe: Width of the narrowest lobe of all draws, which the rule resolves, and that which makes the regions.
         nodes: Of the rule over ω_o.
+        metrics: What is integrated.
     """
     isotropic = all(model.isotropic for model, _ in pair)
     rules = lobe_rules(theta_i, of_lobe[0], isotropic=isotropic, nodes=nodes)
     turns = len(rules) // len(theta_i)
-    weights = [_weights(rule, memberships(rule.wi, rule.wo, of_lobe[1])) for rule in rules]
-    shape = len(pair[0][1]), len(theta_i), len(METRICS), len(REGIONS)
+    weights = [_weights(rule, memberships(rule.wi, rule.wo, of_lobe[1]), metrics) for rule in rules]
+    shape = len(pair[0][1]), len(theta_i), len(metrics), len(REGIONS)
     top, bottom, albedos = np.zeros(shape), np.zeros(shape), np.zeros((*shape[:2], 2))
-    for rows, k, (one, two) in blocks(pair, [(rule.wi, rule.wo) for rule in rules]):
+    for rows, k, found in blocks(pair, [(rule.wi, rule.wo) for rule in rules]):
         place = k // turns
-        t, b = _terms(rules[k], weights[k], one, two)
+        t, b = _terms(rules[k], weights[k], found, metrics)
         top[rows, place] += t.transpose(1, 0, 2) / turns
         bottom[rows, place] += b.transpose(1, 0, 2) / turns
-        albedos[rows, place] += np.stack([f.mean(axis=2) @ rules[k].weight for f in (one, two)], axis=1) / turns
+        albedos[rows, place] += np.stack([f.mean(axis=2) @ rules[k].weight for f in found], axis=1) / turns
     return top, bottom, albedos
 
 
-def lobe_rules(
-    theta_i: Float[np.ndarray, " k"],
-    width: float,
-    *,
-    isotropic: bool,
-    nodes: tuple[int, int] = (ZENITH_NODES, AZIMUTH_NODES),
-) -> list[Rule]:
-    """A rule over ω_o at each incidence; where the surface is not isotropic `AZIMUTHS` of them, one after the other.
-
-    Args:
-        theta_i: Incidences in radians.
-        width: Slope-like width of the narrowest lobe of all draws, which every wider one is resolved with.
-        isotropic: Whether the models are.
-        nodes: In zenith and azimuth, as in `quadrature.lobe_rule`.
-    """
-    turns = [None] if isotropic else ((np.arange(AZIMUTHS) + 0.5) * np.pi / AZIMUTHS).tolist()
-    return [lobe_rule(theta, width, phi_i=turn, nodes=nodes) for theta in theta_i for turn in turns]
-
-
-WEIGHTS = tuple(dict.fromkeys(metric.weight for metric in METRICS.values()))
-"""Weights of ω_o that metrics have."""
-
-
-def _weights(rule: Rule, inside: Float[np.ndarray, "m r"]) -> Float[np.ndarray, "m w r"]:
-    """Each of `WEIGHTS` at the nodes of a rule, by region."""
-    every = {metric.weight: metric for metric in METRICS.values()}
-    return np.stack([direction_weight(every[name], rule)[:, None] * inside for name in WEIGHTS], axis=1)
+def _weights(rule: Rule, inside: Float[np.ndarray, "m r"], metrics: Sequence[Metric]) -> Float[np.ndarray, "m w r"]:
+    """Each of the weights of ω_o that metrics have at the nodes of a rule, by region."""
+    every = {metric.weight: metric for metric in metrics}
+    return np.stack([direction_weight(metric, rule)[:, None] * inside for metric in every.values()], axis=1)
 
 
 def _terms(
-    rule: Rule, weights: Float[np.ndarray, "m w r"], one: Float[np.ndarray, "d m c"], two: Float[np.ndarray, "d m c"]
+    rule: Rule,
+    weights: Float[np.ndarray, "m w r"],
+    pair: Sequence[Float[np.ndarray, "d m c"]],
+    metrics: Sequence[Metric],
 ) -> tuple[Float[np.ndarray, "k d r"], Float[np.ndarray, "k d r"]]:
     """T and V, or ∫ f₂² w, of every metric by region, channel means."""
-    ci, co, flat = rule.wi[2], rule.wo[:, 2:], weights.reshape(len(weights), -1)
+    (one, two), ci, co, flat = pair, rule.wi[2], rule.wo[:, 2:], weights.reshape(len(weights), -1)
 
     def summed(term: Float[np.ndarray, "d m c"]) -> Float[np.ndarray, "w d r"]:
         found = sum(term[:, :, channel] @ flat for channel in range(term.shape[2])) / term.shape[2]
         return np.asarray(found).reshape(len(term), *weights.shape[1:]).transpose(1, 0, 2)
 
-    apart = {t: t(one, ci, co) - t(two, ci, co) for t in {metric.transform for metric in METRICS.values()}}
+    apart = {t: t(one, ci, co) - t(two, ci, co) for t in {metric.transform for metric in metrics}}
     squares = {t: summed(difference**2) for t, difference in apart.items()}
-    lights = {m.transform: summed(np.abs(apart[m.transform])) for m in METRICS.values() if m.kind == "light"}
+    lights = {m.transform: summed(np.abs(apart[m.transform])) for m in metrics if m.kind == "light"}
     square = summed(two**2)
     solid = np.broadcast_to(weights.sum(axis=0)[:, None], square.shape)
-    top, bottom = [], []
-    for metric in METRICS.values():
-        place = WEIGHTS.index(metric.weight)
+    top, bottom, places = [], [], list(dict.fromkeys(metric.weight for metric in metrics))
+    for metric in metrics:
+        place = places.index(metric.weight)
         top.append((lights if metric.kind == "light" else squares)[metric.transform][place])
         bottom.append((square if metric.kind == "relative" else solid)[place])
     return np.stack(top), np.stack(bottom)

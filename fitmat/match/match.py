@@ -14,7 +14,7 @@ from fitmat import arguments
 from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
 from fitmat.match import sentences
-from fitmat.match.ablation import Ablation, ablate
+from fitmat.match.ablation import GRAZING, Ablation, ablate
 from fitmat.match.appearance.spheres import Perceived, perceived
 from fitmat.match.discernibility import Telling, tell_apart
 from fitmat.match.distances import ANGLES, Distances, PairedDraws, measure_distances
@@ -23,8 +23,10 @@ from fitmat.match.pairing import paired_draws
 from fitmat.match.sentences import CLOSE as CLOSE
 from fitmat.match.sentences import SIMILAR as SIMILAR
 from fitmat.match.sentences import STRONG_EVIDENCE as STRONG_EVIDENCE
+from fitmat.maths.blas import one_thread
 from fitmat.measurements.incidences import incidence_range, incidences
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
+from fitmat.models.metrics import METRICS
 from fitmat.models.registry import LOBES, lobe_names
 from fitmat.text import brief
 from fitmat.uncertainty.estimate import Estimate, band, estimate
@@ -56,7 +58,7 @@ class Match:
         microfacet: Posterior of the microfacet model.
         hemisphere_distance: √(∫∫(f_P − f_M)² c_i c_o / ∫∫ f_M² c_i c_o), over all pairs of directions.
         measured_distance: The same over the incidence angles of the file.
-        cube_root_distance: √(mean (∛(f_P c_i) − ∛(f_M c_i))²) over solid angle, in sr^(−1/3).
+        cube_root_distance: √(mean (∛(f_P c_i) − ∛(f_M c_i))²) over solid angle, in sr^(−1/3); None of a short match.
         albedo_gap_max: Largest |ρ_P − ρ_M| over incidence (channel mean), 0 to 85°.
         albedo_gap_sign: −1 where the empirical model reflects less there, else +1.
         albedo_gap_theta_i_deg: Where it occurs.
@@ -82,7 +84,7 @@ class Match:
     microfacet: Posterior
     hemisphere_distance: Estimate
     measured_distance: Estimate
-    cube_root_distance: Estimate
+    cube_root_distance: Estimate | None
     albedo_gap_max: Estimate
     albedo_gap_sign: int
     albedo_gap_theta_i_deg: float
@@ -174,6 +176,7 @@ def is_microfacet(name: str) -> bool:
     return any(LOBES[part].kind == "microfacet" for part in lobe_names(name))
 
 
+@one_thread()
 def compare(
     one: Posterior | Fit,
     other: Posterior | Fit,
@@ -181,6 +184,7 @@ def compare(
     spheres: bool = True,
     imitations: bool = False,
     pictures: bool = False,
+    short: bool = False,
 ) -> Match:
     """The match between an empirical and a microfacet model, in either order.
 
@@ -190,17 +194,17 @@ def compare(
         spheres: Whether to ask what an eye would see of the difference.
         imitations: Whether to ask for the parameters with which each of the two best imitates the other.
         pictures: Whether to make pictures of the spheres.
+        short: Whether to leave out every metric but "relative", and terms of which the verdict says nothing.
 
     Returns:
         A `Match`; intervals come from independent draws of both posteriors.
 
     Raises:
-        FitmatError: the two are not one empirical and one microfacet model, were fitted to different data, or are not
-            finite.
+        FitmatError: the two are not one empirical and one microfacet model, fitted to the same data, and finite.
     """
     arguments.kind("one", one, Posterior, Fit)
     arguments.kind("other", other, Posterior, Fit)
-    arguments.flags(spheres=spheres, imitations=imitations, pictures=pictures)
+    arguments.flags(spheres=spheres, imitations=imitations, pictures=pictures, short=short)
     if pictures and not spheres:
         raise FitmatError("pictures without spheres, expected spheres = True: they are what is drawn. Leave one out.")
     both = [given if isinstance(given, Fit) else given.fit for given in (one, other)]
@@ -213,14 +217,19 @@ def compare(
     measured = np.deg2rad([group.theta_i_deg for group in every])
     few = draws[0][: FEW_DRAWS + 1], draws[1][: FEW_DRAWS + 1]
     with ThreadPoolExecutor() as pool:
-        measuring = pool.submit(measure_distances, *models, draws=draws, measured=measured)
-        ablating = pool.submit(ablate, *models, draws=few)
+        metrics = {"relative": METRICS["relative"]} if short else METRICS
+        measuring = pool.submit(measure_distances, *models, draws=draws, measured=measured, metrics=metrics)
+        ablating = None if short else pool.submit(ablate, *models, draws=few)
         telling = pool.submit(tell_apart, *fits, draws=few)
         seeing = pool.submit(_perceived, *fits, draws, pictures) if spheres else None
         imitating = pool.map(lambda pair: _imitated(*pair), (fits[::-1], fits)) if imitations else ()
-        parts = {"ablation": ablating.result(), "telling": telling.result(), "perceived": seeing and seeing.result()}
-        parts["imitations"] = tuple(found for each in imitating for found in each)
-    return _concluded((empirical, microfacet), measuring.result(), **parts)
+        found = measuring.result()
+        parts: dict[str, Any] = {"telling": telling.result(), "perceived": seeing and seeing.result()}
+        parts["imitations"] = tuple(one for each in imitating for one in each)
+        if ablating is None and sentences.grazing_matters(found.grazing_excess):
+            ablating = pool.submit(ablate, *models, draws=few, theta_i=GRAZING)
+        parts["ablation"] = ablating and ablating.result()
+    return _concluded((empirical, microfacet), found, **parts)
 
 
 def _imitated(what: Fit, by: Fit) -> list[Imitation]:
@@ -257,7 +266,7 @@ def _concluded(pair: tuple[Posterior, Posterior], found: Distances, **parts: Any
         microfacet=microfacet,
         hemisphere_distance=found.whole["relative"],
         measured_distance=found.measured,
-        cube_root_distance=found.whole["cube-root"],
+        cube_root_distance=found.whole.get("cube-root"),
         albedo_gap_max=estimate(np.abs(gaps).max(axis=1)),
         albedo_gap_sign=int(np.sign(gaps[0, worst])) or 1,
         albedo_gap_theta_i_deg=float(np.rad2deg(ALBEDO_ANGLES[worst])),

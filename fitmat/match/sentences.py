@@ -77,9 +77,9 @@ def telling_sentence(names: Names, telling: Telling) -> str | None:
 
 def grazing_sentence(names: Names, excess: Estimate, ablation: Ablation | None) -> str | None:
     """How much light from grazing incidence is missing or too much, and why; None where it is little or not certain."""
-    low, high = sorted(abs(100 * x) for x in excess.ci95)
-    if abs(excess.value) < MENTIONED or excess.ci95[0] * excess.ci95[1] <= 0:
+    if not grazing_matters(excess):
         return None
+    low, high = sorted(abs(100 * x) for x in excess.ci95)
     side = "less" if excess.value < 0 else "more"
     causes = ablation.causes(ablation.grazing) if ablation is not None else ()
     why = f": it has {' and '.join(TERMS[cause] for cause in causes)}" if causes else ""
@@ -88,6 +88,11 @@ def grazing_sentence(names: Names, excess: Estimate, ablation: Ablation | None) 
         + (f" ({low:.0f}–{high:.0f} %)" if excess.has_interval else "")
         + f"{why}."
     )
+
+
+def grazing_matters(excess: Estimate) -> bool:
+    """Whether so much light from grazing incidence is missing or too much that it is said."""
+    return abs(excess.value) >= MENTIONED and excess.ci95[0] * excess.ci95[1] > 0
 
 
 def gap_sentence(names: Names, gap: Estimate, sign: int, theta_i_deg: float, measured_deg: tuple[float, float]) -> str:

@@ -19,6 +19,9 @@ from fitmat.maths.directions import rotated
 
 ZENITH_NODES = 64
 AZIMUTH_NODES = 32
+AZIMUTHS = 4
+"""Azimuths of incidence over half a turn in `lobe_rules`, where a surface is anisotropic."""
+
 INCIDENCE_NODES = 16
 CURVE_NODES = 24
 
@@ -112,6 +115,11 @@ def reflected(normals: Facets) -> Rule:
     return Rule(wi, wo, weight)
 
 
+def stepped(width: float, octave: int = 4) -> float:
+    """The next width below of a series of so many an octave: a rule for it resolves the lobe too, and serves many."""
+    return float(2.0 ** (np.floor(octave * np.log2(max(width, 1e-300))) / octave))
+
+
 def lobe_rule(
     theta_i: float, width: float, *, phi_i: float | None = None, nodes: tuple[int, int] = (ZENITH_NODES, AZIMUTH_NODES)
 ) -> Rule:
@@ -139,6 +147,29 @@ def lobe_rule(
     if phi_i is not None:
         wi, h = rotated(wi, phi_i), rotated(h, phi_i)
     return reflected(Facets(wi, h.reshape(3, -1).T, np.ravel(solid)))
+
+
+def lobe_rules(
+    theta_i: Float[np.ndarray, " k"],
+    width: float,
+    *,
+    isotropic: bool,
+    nodes: tuple[int, int] = (ZENITH_NODES, AZIMUTH_NODES),
+) -> list[Rule]:
+    """A rule over ω_o at each incidence; of a surface that is not isotropic `AZIMUTHS` of them, one after the other.
+
+    Args:
+        theta_i: Incidences in radians.
+        width: Slope-like width of the narrowest lobe of all draws, which every wider one is resolved with.
+        isotropic: Whether the surfaces are.
+        nodes: In zenith and azimuth, as in `lobe_rule`.
+    """
+    turns = [None] if isotropic else ((np.arange(AZIMUTHS) + 0.5) * np.pi / AZIMUTHS).tolist()
+    width = stepped(width)
+    return [_rule(float(theta), width, phi_i=turn, nodes=nodes) for theta in theta_i for turn in turns]
+
+
+_rule = functools.lru_cache(1024)(lobe_rule)  # files of a batch have incidences and widths in common
 
 
 def _rings_and_arcs(border: float, count: int) -> tuple[np.ndarray, np.ndarray]:

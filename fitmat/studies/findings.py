@@ -102,6 +102,8 @@ def find(
     identifiability: Identifiability | None = None,
     check: PredictiveCheck | None = None,
     possible: Yardstick | None = None,
+    *,
+    short: bool = False,
 ) -> Findings:
     """What a posterior says of its model.
 
@@ -111,6 +113,7 @@ def find(
         identifiability: What the angles determine, where that was asked; what they leave open is called so everywhere.
         check: Whether the model can make such data, where that was asked.
         possible: What the readings themselves say, of which a model explains a share.
+        short: Whether to leave out the budget, and what only a page says: scope, light left out, and metrics.
     """
     fit = posterior.fit
     fitted = posterior.quantities(() if identifiability is None else identifiability.undetermined)
@@ -120,17 +123,21 @@ def find(
         parameters=tuple(fitted),
         derived=tuple(follows),
         doubts=find_doubts(fit),
-        scope=describe_scope(fit),
-        several_facets=left_out(fit),
-        metrics=fit_metrics(fit) | {"explained": None if possible is None else explained(possible, fit)},
+        scope="" if short else describe_scope(fit),
+        several_facets="" if short else left_out(fit),
+        metrics={} if short else _metrics(fit, possible),
         priors=priors.words(fit.model, fit.data.prior),
         learnt=_learnt(posterior),
         curves=predict_curves(posterior, along),
         residuals=standardised_residuals(fit),
-        budget=draw_up(posterior, fitted, follows),
+        budget=None if short else draw_up(posterior, fitted, follows),
         identifiability=identifiability,
         check=check,
     )
+
+
+def _metrics(fit: Fit, possible: Yardstick | None) -> dict[str, float | None]:
+    return {**fit_metrics(fit), "explained": None if possible is None else explained(possible, fit)}
 
 
 def _learnt(posterior: Posterior) -> tuple[Learnt, ...]:

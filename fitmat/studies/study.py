@@ -18,12 +18,13 @@ from fitmat.fitting.losses import DEFAULT
 from fitmat.judgement.budget import Line, of_draws
 from fitmat.judgement.choice import Choice, choose
 from fitmat.judgement.examination.examining import warnings
-from fitmat.judgement.identifiability.verdicts import Identifiability, identify
+from fitmat.judgement.identifiability.verdicts import identify
 from fitmat.judgement.prediction import sections
-from fitmat.judgement.predictive_check import PredictiveCheck, check_predictions
+from fitmat.judgement.predictive_check import check_predictions
 from fitmat.judgement.yardstick import yardstick
 from fitmat.match.match import Match, compare, is_empirical, is_microfacet
 from fitmat.match.pairing import paired_draws
+from fitmat.maths.blas import one_thread
 from fitmat.measurements.large.stream import Stream
 from fitmat.measurements.reader import measurements_of
 from fitmat.measurements.samples import Measurements
@@ -107,6 +108,7 @@ class Study:
         return tuple(found for found in self.findings if found.posterior in chosen)
 
 
+@one_thread()
 def study(
     measurements: Measurements | Stream | str | os.PathLike[str],
     models: str | Sequence[str] = DEFAULT_MODELS,
@@ -122,6 +124,7 @@ def study(
     seed: int = 0,
     second_opinion: bool = False,
     full: bool = False,
+    short: bool = False,
     resume: Path | None = None,
     progress: Progress | None = None,
 ) -> Study:
@@ -144,6 +147,9 @@ def study(
         full: Whether to ask what takes longer than it tells at first sight as well: the parameters with which each
             model of the match best imitates the other, pictures of the spheres, and of two models what each predicts
             of single values left out.
+        short: Whether to leave out what a table of many files does not show: curves, budgets, predictive checks, what
+            can be explained, what predicts an incidence left out best, and of the match every metric but the relative
+            one; nothing else changes.
         resume: Folder in which the sampling is kept while it lasts; None to keep nothing.
         progress: Called with what is done next.
 
@@ -162,7 +168,7 @@ def study(
     for name, text in (("loss", loss), ("masking", masking), ("ior", ior), ("dispersion", dispersion)):
         arguments.kind(name, text, str, optional=name != "loss")
     arguments.whole("seed", seed)
-    arguments.flags(tilt=tilt, sampling=sampling, second_opinion=second_opinion, full=full)
+    arguments.flags(tilt=tilt, sampling=sampling, second_opinion=second_opinion, full=full, short=short)
     arguments.kind("resume", resume, Path, optional=True)
     arguments.function("progress", progress)
     say = progress or (lambda *_: None)
@@ -179,7 +185,8 @@ def study(
         first = pass_over(stream, jobs, seed, say)
     walking = sampling and first[0].fit.loss.posterior and first[0].fit.n_values <= MOST_SAMPLED
     posteriors = sample_each(first, seed=seed, resume=resume, progress=say) if walking else first
-    found = judge(posteriors, seed=seed, second_opinion=second_opinion, full=full, progress=say)
+    asked = {"second_opinion": second_opinion, "full": full, "short": short}
+    found = judge(posteriors, seed=seed, **asked, progress=say)
     return found if stream is shown else dataclasses.replace(found, rows=counted(given))
 
 
@@ -189,6 +196,7 @@ def judge(
     seed: int,
     second_opinion: bool = False,
     full: bool = False,
+    short: bool = False,
     progress: Progress | None = None,
 ) -> Study:
     """Match, weigh and examine posteriors of fits to the same measurements.
@@ -198,28 +206,34 @@ def judge(
         seed: Of the replicated data and of the second sampler.
         second_opinion: Whether to sample chains a second time with another method; what has none goes without.
         full: As in `study`.
+        short: As in `study`.
         progress: Called with what is done next.
     """
     say = progress or (lambda *_: None)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         odd = pool.submit(_odd, posteriors)
-        possible = pool.submit(yardstick, posteriors[0].fit.measurements)
+        possible = None if short else pool.submit(yardstick, posteriors[0].fit.measurements)
         say("comparing", 0, 0)
-        match = _match(posteriors, full)
+        match = _match(posteriors, full, short)
         usable = [p for p in posteriors if p.fit.finite and p.fit.loss.posterior]
         choice = None
         if len(usable) > 1:
             say("weighing the models", 0, 0)
             whole = usable[0].fit.n_values == usable[0].fit.measurements.n_valid
-            choice = choose(usable, predicting=whole, singly=full or len(usable) > 2)
-        along = sections(posteriors[0].fit.measurements)
+            choice = choose(usable, predicting=whole and not short, singly=full or len(usable) > 2)
+        along = () if short else sections(posteriors[0].fit.measurements)
         looked_at = [p for p in _detailed(usable, match, choice) if p in usable]
         findings, count = [], len(posteriors)
         words = f"examining {', '.join(p.fit.name for p in posteriors) if count <= DETAILED else f'{count} models'}"
         say(words, 0, count)
 
         def looked(posterior: Posterior) -> Findings:
-            asked, check = _examined(posterior, seed) if posterior in looked_at else (None, None)
+            looking = posterior in looked_at
+            asked = identify(posterior) if looking else None
+            if possible is None:
+                return find(posterior, (), asked, short=True)
+            checked = looking and not posterior.fit.loss.robust
+            check = check_predictions(posterior, seed=seed) if checked else None
             return find(posterior, along, asked, check, possible.result())
 
         for found in pool.map(looked, posteriors):
@@ -229,7 +243,8 @@ def judge(
         asked = [found.posterior in looked_at and found.posterior.chain is not None for found in findings]
         findings = [_asked_again(f, seed, say) if again else f for f, again in zip(findings, asked, strict=True)]
     advice = advise(findings, match, choice)
-    return Study(tuple(findings), match, choice, _distance(match), advice, full, odd.result())
+    line = None if short else _distance(match)
+    return Study(tuple(findings), match, choice, line, advice, full, odd.result())
 
 
 def _distance(match: Match | None) -> Line | None:
@@ -251,24 +266,19 @@ def _odd(posteriors: Sequence[Posterior]) -> tuple[str, ...]:
     return warnings(fit.measurements, fit.noise, tilted=tilted)
 
 
-def _examined(posterior: Posterior, seed: int) -> tuple[Identifiability, PredictiveCheck | None]:
-    """What is asked of a few models only."""
-    return identify(posterior), None if posterior.fit.loss.robust else check_predictions(posterior, seed=seed)
-
-
 def _asked_again(found: Findings, seed: int, say: Progress) -> Findings:
     """With what another sampler says."""
     say(f"sampling {found.name} a second time", 0, 0)
     return dataclasses.replace(found, second_opinion=second_sampler.check_posterior(found.posterior, seed=seed))
 
 
-def _match(posteriors: Sequence[Posterior], full: bool) -> Match | None:
+def _match(posteriors: Sequence[Posterior], full: bool, short: bool) -> Match | None:
     """The match of the first empirical and the first microfacet model, if there are both and both are finite."""
     empirical = next((p for p in posteriors if is_empirical(p.fit.name)), None)
     microfacet = next((p for p in posteriors if is_microfacet(p.fit.name) and not is_empirical(p.fit.name)), None)
     if empirical is None or microfacet is None or not (empirical.fit.finite and microfacet.fit.finite):
         return None
-    found = compare(empirical, microfacet, imitations=full, pictures=full)
+    found = compare(empirical, microfacet, imitations=full, pictures=full, short=short)
     return found if np.isfinite(found.hemisphere_distance.value) else None
 
 

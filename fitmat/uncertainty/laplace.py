@@ -18,6 +18,7 @@ from fitmat.fitting import fitting
 from fitmat.fitting.coordinates import Coordinates
 from fitmat.fitting.information import inverse_information
 from fitmat.fitting.result import Fit
+from fitmat.maths.blas import one_thread
 from fitmat.measurements.samples import Measurements
 from fitmat.text import brief
 from fitmat.uncertainty.density import log_posterior, physical
@@ -46,6 +47,7 @@ HEAVY_TAIL = 6.0
 """Degrees of freedom of the t distribution that proposes draws of its own around the Laplace approximation."""
 
 
+@one_thread()
 def laplace(fit: Fit, *, seed: int, corrected: bool = True) -> Posterior:
     """Draws around the best fit without walking there.
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fitmat.colour import differences
-from fitmat.colour.differences import delta_e_2000, delta_e_itp
+from fitmat.colour.differences import delta_e_2000, delta_e_itp, greys_2000, greys_itp
 
 PRINTED = 5e-5
 """ΔE2000; Sharma's table has four digits after the point."""
@@ -54,6 +54,14 @@ def to_xyz(lab: np.ndarray) -> np.ndarray:
     """CIE 15:2018, the inverse of eqs. 8.3–8.8, white at Y = 1."""
     f = (lab[:, :1] + 16) / 116 + np.stack([lab[:, 1] / 500, 0 * lab[:, 1], -lab[:, 2] / 200], axis=1)
     return WHITE * np.where(f > 6 / 29, f**3, 3 * (6 / 29) ** 2 * (f - 4 / 29))
+
+
+def test_greys_are_colours_without_chroma() -> None:
+    """By the formulas for any colour; darker than black and brighter than white included."""
+    one, other = np.meshgrid([0.0, 1e-4, 0.005, 0.18, 0.9, 1.0, 30.0, 80.0], [0.0, 2e-4, 0.2, 1.0, 3.0])
+    of_any = [function(one[..., None] * WHITE, other[..., None] * WHITE) for function in (delta_e_2000, delta_e_itp)]
+    np.testing.assert_allclose(greys_2000(one, other), of_any[0], rtol=ROUNDING, atol=ROUNDING)
+    np.testing.assert_allclose(greys_itp(one, other), of_any[1], rtol=ROUNDING, atol=ROUNDING)
 
 
 def test_colour_differences_are_those_that_sharma_printed() -> None:

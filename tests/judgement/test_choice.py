@@ -13,6 +13,7 @@ from scipy import stats
 import fitmat as fm
 from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
+from fitmat.judgement import choice
 from fitmat.judgement.choice import Candidate, Choice
 from fitmat.judgement.evidence import MOST_LEFT_OUT, Evidence, weigh
 from fitmat.judgement.left_out import MOST_REFITTED, leave_incidences_out
@@ -209,9 +210,11 @@ def test_where_nothing_is_a_number_aicc_decides(rough: Choice, monkeypatch: pyte
         assert found.candidates[1].behind == pytest.approx(behind, rel=1e-12)
 
 
-def test_what_speaks_against_the_best_is_said(rough: Choice) -> None:
-    impossible = candidate(rough, 0.0, 0.0, broken=("is not reciprocal",), doubts=("kd at its upper bound",))
-    lawful = rough.candidates[1]
+def test_what_speaks_against_the_best_is_said(rough: Choice, monkeypatch: pytest.MonkeyPatch) -> None:
+    laws = {"oren-nayar": ("is not reciprocal",)}
+    monkeypatch.setattr(choice, "broken_laws", lambda fit: laws.get(fit.name, ()))
+    impossible = candidate(rough, 0.0, 0.0, doubts=("kd at its upper bound",))
+    lawful = dataclasses.replace(rough.candidates[1])
     words = Choice((impossible, lawful)).verdict
     assert "But oren-nayar is not reciprocal. The best of those that break no law is lambert." in words
     assert "Of oren-nayar: kd at its upper bound." in words

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import fitmat as fm
+from fitmat.batches import rows
 from fitmat.errors import FitmatError
 from fitmat.measurements.large import chunks
 from fitmat.measurements.samples import Measurements
@@ -26,6 +27,9 @@ from fitmat.studies.study import DETAILED, Study, judge, study
 from fitmat.uncertainty.posterior import Posterior
 
 NAMES = ("lambert+blinn-phong", "lambert+ggx")
+
+SAME = 1e-9
+"""Relative; the same sums in another order."""
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +59,28 @@ def test_a_study_holds_one_noun_for_each_model(studied: Study, measurements: Mea
         assert [q.name for q in found.parameters] == [*(e.name for e in found.fit.entries), "discrepancy"]
         assert [learnt.name for learnt in found.learnt] == list(found.fit.coordinates.names)
         assert found.residuals.shape == found.fit.data.x.shape
+
+
+def test_a_short_study_says_the_same_of_less(studied: Study, measurements: Measurements) -> None:
+    """A row of a table and the verdict are those of the whole; what only a page shows is not there."""
+    found = study(measurements, NAMES, sampling=False, short=True)
+    assert found.match is not None
+    assert studied.match is not None
+    assert found.match.verdict == studied.match.verdict
+    assert found.match.ablation is not None
+    assert studied.match.ablation is not None
+    assert found.match.ablation.grazing == studied.match.ablation.grazing
+    assert found.match.ablation.near == {}
+    assert list(found.match.distances.whole) == ["relative"]
+    assert found.match.cube_root_distance is None
+    for row, whole in zip(rows.rows(found), rows.rows(studied), strict=True):
+        assert row.keys() == whole.keys()
+        for name, cell in row.items():
+            assert cell == (pytest.approx(whole[name], rel=SAME) if isinstance(cell, float) else whole[name]), name
+    for one in found.findings:
+        assert (one.curves, one.budget, one.check, one.metrics, one.scope) == ((), None, None, {}, "")
+        assert one.identifiability is not None
+    assert json.loads(json.dumps(record.to_dict(found), allow_nan=False))["match"]["budget"] is None
 
 
 def test_what_is_written_is_read_back(studied: Study, tmp_path: Path) -> None:

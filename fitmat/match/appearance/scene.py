@@ -9,12 +9,13 @@ with its x axis along the parallels about the vertical axis y, as if turned on a
 """
 
 import dataclasses
+import functools
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from fitmat.maths.directions import zenith
-from fitmat.maths.quadrature import Rule, facets, gauss, lobe_rule
+from fitmat.maths.quadrature import Rule, facets, gauss, lobe_rule, stepped
 from fitmat.text import brief
 
 LIGHTS = {"front light": (20.0, 120.0), "side light": (60.0, 150.0), "rim light": (140.0, 45.0)}
@@ -236,6 +237,11 @@ def surrounded(width: float, *, isotropic: bool, finer: int = 1) -> Surrounded:
         isotropic: Whether both models are.
         finer: How many times as many rings, and pixels on each.
     """
+    return _surrounded(stepped(width, 2), isotropic, finer)
+
+
+@functools.lru_cache(8)
+def _surrounded(width: float, isotropic: bool, finer: int) -> Surrounded:
     count, pixels = (finer * n for n in ((SKY_RINGS, SKY_PIXELS) if isotropic else (COARSE_RINGS, COARSE_PIXELS)))
     nodes, weights = gauss(count)
     square = 1.0 - GRAZING**2

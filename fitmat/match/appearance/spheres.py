@@ -14,8 +14,15 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.colour.channels import colouring
-from fitmat.colour.differences import CLEARLY_VISIBLE, JUST_NOTICEABLE, delta_e_2000, delta_e_itp
-from fitmat.colour.spaces import shown, to_srgb
+from fitmat.colour.differences import (
+    CLEARLY_VISIBLE,
+    JUST_NOTICEABLE,
+    delta_e_2000,
+    delta_e_itp,
+    greys_2000,
+    greys_itp,
+)
+from fitmat.colour.spaces import FROM_SRGB, shown, to_srgb
 from fitmat.match.appearance import finer, scene
 from fitmat.match.appearance.scene import Raster, Screen
 from fitmat.match.appearance.spread import Seen, Spread, spread
@@ -143,7 +150,7 @@ def perceived(
     colours, count = colouring(channels), len(draws[0])
     used = np.unique(np.r_[0, np.linspace(min(1, count - 1), count - 1, min(SPHERE_DRAWS, count)).round().astype(int)])
     pair = surfaces(empirical, draws[0][used]), surfaces(microfacet, draws[1][used])
-    screens, computed = _rendered(pair, colours.weights)
+    screens, computed = _rendered(pair, colours.weights[:, 1:2] if colours.grey else colours.weights)
     names = [*scene.LIGHTS, scene.ENVIRONMENT]
     each = zip(names, screens, computed, strict=True)
     lightings, seen = zip(*(_lighting(name, screen, xyz, pictures) for name, screen, xyz in each), strict=True)
@@ -157,9 +164,9 @@ def perceived(
 
 
 def _rendered(
-    pair: tuple[Draws, Draws], weights: Float[np.ndarray, "c 3"]
-) -> tuple[list[Screen], list[Float[np.ndarray, "d 2 m 3"]]]:
-    """The pixels of each lighting, and XYZ radiances there of both models for d pairs of draws."""
+    pair: tuple[Draws, Draws], weights: Float[np.ndarray, "c k"]
+) -> tuple[list[Screen], list[Float[np.ndarray, "d 2 m k"]]]:
+    """The pixels of each lighting, and XYZ radiances there, or luminances, of both models for d pairs of draws."""
     width = float(min(widths(*part).min() for part in pair))
     isotropic = all(model.isotropic for model, _ in pair)
     spots = [scene.lit(width, *where, isotropic=isotropic) for where in scene.LIGHTS.values()]
@@ -170,35 +177,36 @@ def _rendered(
 
 
 def under_light(
-    part: Draws, wi: Float[np.ndarray, "m 3"], wo: Float[np.ndarray, "m 3"], weights: Float[np.ndarray, "c 3"]
-) -> Float[np.ndarray, "d m 3"]:
-    """XYZ radiances of every draw in a light of one direction, of irradiance 1 on a surface that faces it."""
+    part: Draws, wi: Float[np.ndarray, "m 3"], wo: Float[np.ndarray, "m 3"], weights: Float[np.ndarray, "c k"]
+) -> Float[np.ndarray, "d m k"]:
+    """Weighted radiances of every draw in a light of one direction, of irradiance 1 on a surface that faces it."""
     return _coloured(values(*part, wi, wo), weights) * wi[:, 2:]
 
 
-def under_sky(part: Draws, around: scene.Surrounded, weights: Float[np.ndarray, "c 3"]) -> Float[np.ndarray, "d m 3"]:
-    """XYZ radiances of every draw in the environment."""
-    found = np.zeros((len(part[1]), *around.light.shape[:2], 3))
+def under_sky(part: Draws, around: scene.Surrounded, weights: Float[np.ndarray, "c k"]) -> Float[np.ndarray, "d m k"]:
+    """Weighted radiances of every draw in the environment."""
+    found = np.zeros((len(part[1]), *around.light.shape[:2], weights.shape[1]))
     for rows, k, (f,) in blocks([part], list(zip(around.wi, around.wo, strict=True))):
         found[rows, k] = around.light[k] @ _coloured(f, weights)
-    return found.reshape(len(found), -1, 3)
+    return found.reshape(len(found), -1, weights.shape[1])
 
 
-def _coloured(f: Float[np.ndarray, "d m c"], weights: Float[np.ndarray, "c 3"]) -> Float[np.ndarray, "d m 3"]:
-    """XYZ of values in the channels; of a model with one value for all where there are several."""
+def _coloured(f: Float[np.ndarray, "d m c"], weights: Float[np.ndarray, "c k"]) -> Float[np.ndarray, "d m k"]:
+    """Values in the channels, weighted; of a model with one value for all where there are several."""
     return np.broadcast_to(f, (*f.shape[:2], len(weights))) @ weights
 
 
 def _lighting(
-    name: str, screen: Screen, xyz: Float[np.ndarray, "d 2 m 3"], pictures: bool
+    name: str, screen: Screen, xyz: Float[np.ndarray, "d 2 m k"], pictures: bool
 ) -> tuple[Lighting, tuple[Seen, Seen]]:
     """The lighting, and ΔE2000 and ΔE_ITP there."""
     share = np.asarray(screen.area / screen.area.sum()).ravel()
-    exposure = float(MIDDLE_GREY / max(share @ xyz[0, 1, :, 1], 1e-300))
+    size = xyz.shape[-1]
+    exposure = float(MIDDLE_GREY / max(share @ xyz[0, 1, :, size // 2], 1e-300))
     one, other = np.moveaxis(exposure * xyz, 1, 0)
     both = np.concatenate([one[0], other[0]], axis=1)
     fine, half = finer.divided(screen, both), finer.divided(*finer.halved(screen, both))
-    each = [_differences(one, other), *(_differences(v[:, :3], v[:, 3:]) for v, _ in (fine, half))]
+    each = [_differences(one, other), *(_differences(v[:, :size], v[:, size:]) for v, _ in (fine, half))]
     shares = [area / area.sum() for _, area in (fine, half)]
     seen = Seen(each[0][0], share, (each[1][0], shares[0]), (each[2][0], shares[1]))
     itp = Seen(each[0][1], share, (each[1][1], shares[0]), (each[2][1], shares[1]))
@@ -212,12 +220,17 @@ def _lighting(
     return lighting, (seen, itp)
 
 
-def _differences(one: Float[np.ndarray, "... 3"], other: Float[np.ndarray, "... 3"]) -> tuple[np.ndarray, np.ndarray]:
-    """ΔE2000 of what a display shows, and ΔE_ITP."""
+def _differences(one: Float[np.ndarray, "... k"], other: Float[np.ndarray, "... k"]) -> tuple[np.ndarray, np.ndarray]:
+    """ΔE2000 of what a display shows, and ΔE_ITP, of XYZ or of the luminances of greys."""
+    if one.shape[-1] == 1:
+        one, other = one[..., 0], other[..., 0]
+        return greys_2000(np.clip(one, 0.0, 1.0), np.clip(other, 0.0, 1.0)), greys_itp(one, other)
     return delta_e_2000(shown(one), shown(other)), delta_e_itp(np.maximum(one, 0.0), np.maximum(other, 0.0))
 
 
-def _both(screen: Screen, one: Float[np.ndarray, "m 3"], other: Float[np.ndarray, "m 3"]) -> Pictures:
+def _both(screen: Screen, one: Float[np.ndarray, "m k"], other: Float[np.ndarray, "m k"]) -> Pictures:
+    if one.shape[1] == 1:
+        one, other = one * FROM_SRGB.sum(axis=1), other * FROM_SRGB.sum(axis=1)
     drawn = pictured(screen, np.concatenate([one, other], axis=1), scene.raster(SIZE))
     one, other = drawn[..., :3], drawn[..., 3:]
     return Pictures(to_srgb(one), to_srgb(other), delta_e_2000(shown(one), shown(other)))
