@@ -20,11 +20,12 @@ from fitmat.fitting.coordinates import Coordinates, coordinates
 from fitmat.fitting.refining import STEADY
 from fitmat.fitting.result import Fit
 from fitmat.fitting.starts import nonnegative
-from fitmat.match.distances import direction_weight, incidence_weight, lobe_rules
+from fitmat.match.distances import direction_weight, incidence_weight
 from fitmat.match.regions import incidence_panels
 from fitmat.maths.least_squares import least_squares
 from fitmat.maths.mapping import mapped
 from fitmat.maths.programs import program
+from fitmat.maths.quadrature import lobe_rules
 from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
 from fitmat.models.conversion import exponent_from_alpha

@@ -61,26 +61,32 @@ def test_a_study_holds_one_noun_for_each_model(studied: Study, measurements: Mea
         assert found.residuals.shape == found.fit.data.x.shape
 
 
-def test_a_short_study_says_the_same_of_less(studied: Study, measurements: Measurements) -> None:
+def test_a_short_study_says_the_same_of_less(
+    studied: Study, measurements: Measurements, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A row of a table and the verdict are those of the whole; what only a page shows is not there."""
     found = study(measurements, NAMES, sampling=False, short=True)
     assert found.match is not None
     assert studied.match is not None
     assert found.match.verdict == studied.match.verdict
-    assert found.match.ablation is not None
-    assert studied.match.ablation is not None
-    assert found.match.ablation.grazing == studied.match.ablation.grazing
-    assert found.match.ablation.near == {}
+    assert found.match.ablation is None  # nothing is said of it
     assert list(found.match.distances.whole) == ["relative"]
     assert found.match.cube_root_distance is None
-    for row, whole in zip(rows.rows(found), rows.rows(studied), strict=True):
-        assert row.keys() == whole.keys()
+    for row, other in zip(rows.rows(found), rows.rows(studied), strict=True):
+        assert row.keys() == other.keys()
         for name, cell in row.items():
-            assert cell == (pytest.approx(whole[name], rel=SAME) if isinstance(cell, float) else whole[name]), name
+            assert cell == (pytest.approx(other[name], rel=SAME) if isinstance(cell, float) else other[name]), name
     for one in found.findings:
         assert (one.curves, one.budget, one.check, one.metrics, one.scope) == ((), None, None, {}, "")
         assert one.identifiability is not None
     assert json.loads(json.dumps(record.to_dict(found), allow_nan=False))["match"]["budget"] is None
+    monkeypatch.setattr("fitmat.match.sentences.grazing_matters", lambda excess: True)
+    said, whole = fm.compare(*found.posteriors, spheres=False, short=True).ablation, studied.match.ablation
+    assert said is not None
+    assert whole is not None
+    assert said.near == {}
+    for term, fall in said.grazing.items():
+        assert fall.ci95 == pytest.approx(whole.grazing[term].ci95, rel=SAME)
 
 
 def test_what_is_written_is_read_back(studied: Study, tmp_path: Path) -> None:
