@@ -20,7 +20,8 @@ from peer import Problem, from_sine
 
 import fitmat as fm
 from fitmat.fitting.coordinates import coordinates
-from fitmat.fitting.likelihood import Data, every_residual, first_discrepancy, prepare, transformed
+from fitmat.fitting.discrepancy import first_discrepancy
+from fitmat.fitting.likelihood import Data, every_residual, prepare, transformed
 from fitmat.fitting.refining import LITTLE_DAMPING, MANY_ROWS
 from fitmat.maths.least_squares import Minimum, Normal, least_squares, normal_equations
 from fitmat.measurements.noise import measured_noise

@@ -6,9 +6,10 @@ It solves nothing.
 import numpy as np
 
 from fitmat.fitting.coordinates import coordinates
+from fitmat.fitting.discrepancy import best_discrepancy, first_discrepancy
 from fitmat.fitting.ends import AGREE, AS_GOOD, Ends, behind, home
 from fitmat.fitting.information import covariance, information
-from fitmat.fitting.likelihood import Data, best_discrepancy, first_discrepancy
+from fitmat.fitting.likelihood import Data
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.result import Fit
 from fitmat.fitting.symmetries import nearest

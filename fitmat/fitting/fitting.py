@@ -14,10 +14,11 @@ from fitmat import arguments
 from fitmat.errors import FitmatError, ModelError
 from fitmat.fitting.concluding import conclude
 from fitmat.fitting.coordinates import Coordinates, coordinates
+from fitmat.fitting.discrepancy import first_discrepancy
 from fitmat.fitting.dispersed import dispersed
 from fitmat.fitting.ends import Ends, behind
 from fitmat.fitting.jitter import AGAIN, jittered
-from fitmat.fitting.likelihood import Data, first_discrepancy, prepare
+from fitmat.fitting.likelihood import Data, prepare
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.losses import loss as find_loss
 from fitmat.fitting.priors import prepare_prior, refuse_idle

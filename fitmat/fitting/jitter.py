@@ -10,7 +10,8 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.fitting.likelihood import Data, noise_scale
+from fitmat.fitting.discrepancy import noise_scale
+from fitmat.fitting.likelihood import Data
 from fitmat.models.around.instrument import displaced
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.values import at

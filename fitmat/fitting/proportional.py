@@ -10,8 +10,9 @@ import numpy as np
 
 from fitmat.fitting.concluding import discrepancy_of
 from fitmat.fitting.coordinates import Coordinates
+from fitmat.fitting.discrepancy import first_discrepancy
 from fitmat.fitting.ends import Ends, behind
-from fitmat.fitting.likelihood import Data, first_discrepancy, log_pointwise, prepare
+from fitmat.fitting.likelihood import Data, log_pointwise, prepare
 from fitmat.fitting.process import FEWEST
 from fitmat.fitting.refining import optima
 from fitmat.measurements.neighbours import curves

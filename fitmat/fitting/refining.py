@@ -12,16 +12,9 @@ from jaxtyping import Array, ArrayLike
 
 from fitmat.fitting.channelwise import Part, divides, layout
 from fitmat.fitting.coordinates import Coordinates, coordinates
+from fitmat.fitting.discrepancy import best_discrepancy, first_discrepancy
 from fitmat.fitting.ends import AGREE, Ends, behind, home
-from fitmat.fitting.likelihood import (
-    Data,
-    best_discrepancy,
-    every_residual,
-    first_discrepancy,
-    log_density,
-    predicted,
-    transformed,
-)
+from fitmat.fitting.likelihood import Data, every_residual, log_density, predicted, transformed
 from fitmat.maths.grams import Layout
 from fitmat.maths.least_squares import Residuals, least_squares
 from fitmat.maths.mapping import mapped

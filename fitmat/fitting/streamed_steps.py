@@ -6,8 +6,8 @@ It passes over no file: the sums of all rows are given.
 import numpy as np
 from jaxtyping import Float
 
+from fitmat.fitting.discrepancy import NEGLIGIBLE
 from fitmat.fitting.information import FOLLOWS, expected_information, observed_information
-from fitmat.fitting.likelihood import NEGLIGIBLE
 from fitmat.fitting.result import Fit
 from fitmat.fitting.streamed_sums import Sums
 from fitmat.models.base import AbstractBRDF

@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.fitting.concluding import discrepancy_of
+from fitmat.fitting.discrepancy import first_discrepancy
 from fitmat.fitting.information import covariance, information
-from fitmat.fitting.likelihood import first_discrepancy
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.result import Fit
 from fitmat.models.values import at

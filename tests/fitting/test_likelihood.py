@@ -14,15 +14,8 @@ from hypothesis import strategies as st
 from scipy import integrate, optimize, stats
 
 import fitmat as fm
-from fitmat.fitting.likelihood import (
-    NEGLIGIBLE,
-    Data,
-    best_discrepancy,
-    first_discrepancy,
-    log_likelihood,
-    prepare,
-    residuals,
-)
+from fitmat.fitting.discrepancy import NEGLIGIBLE, best_discrepancy, first_discrepancy
+from fitmat.fitting.likelihood import Data, log_likelihood, prepare, residuals
 from fitmat.fitting.stabilising import from_stabilised, spread, stabilised
 from fitmat.measurements.noise import Noise
 

@@ -55,7 +55,7 @@ def counted(samples: Samples) -> Int[np.ndarray, " T"]:
 
 
 def first_discrepancies(samples: Samples) -> Float[np.ndarray, " T"]:
-    """`likelihood.first_discrepancy` of every surface; 1 where nothing is valid, or all is 0."""
+    """`discrepancy.first_discrepancy` of every surface; 1 where nothing is valid, or all is 0."""
     found = 0.1 * _median(np.cbrt(np.abs(samples.x)), samples.weight)
     return np.where(found > 0.0, found, 1.0)
 
@@ -79,7 +79,7 @@ def _filled(part: Float[np.ndarray, "T n c"], fill: float, surfaces: int, rows: 
 
 
 def _typical(x: np.ndarray, noise: np.ndarray, weight: np.ndarray) -> Float[np.ndarray, " T"]:
-    """`likelihood.noise_scale` of every surface; 1 where nothing is valid."""
+    """`discrepancy.noise_scale` of every surface; 1 where nothing is valid."""
     found = _median(noise / (3.0 * np.cbrt(np.abs(x) + noise) ** 2), weight)
     return np.where(np.isfinite(found), found, 1.0)
 

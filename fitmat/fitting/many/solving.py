@@ -10,7 +10,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
-from fitmat.fitting.likelihood import best_discrepancy, log_pointwise
+from fitmat.fitting.discrepancy import best_discrepancy
+from fitmat.fitting.likelihood import log_pointwise
 from fitmat.fitting.many.lanes import Samples, Shared, alone, from_unbounded, looked, summed
 from fitmat.fitting.refining import BURST, SETTLED, STEADY
 from fitmat.maths.grams import Whole

@@ -18,6 +18,7 @@ from fitmat.fitting.many.lanes import Samples, Shared
 from fitmat.fitting.many.solving import Ends, solve_many
 from fitmat.fitting.many.table import Table, begin_many
 from fitmat.models.parameters import vector
+from fitmat.text import brief
 
 SIZES = (256, 1024, 8192)
 """Surfaces that a call takes."""
@@ -50,6 +51,8 @@ class Work:
     known: Table
     starts: int
     max_steps: int
+
+    __repr__ = brief
 
     def size(self, surfaces: int, threads: int) -> int:
         """How many surfaces a tile takes where there are so many, and so many threads."""
