@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat._types import Scalar, Spectrum, Vec3
+from fitmat.colour.spaces import encoded
 from fitmat.errors import ModelError
 from fitmat.exports.closest import Closest, closest, coloured
 from fitmat.exports.material import Chosen
@@ -134,17 +135,12 @@ class Unity(AbstractEngine):
     @property
     def inputs(self) -> dict[str, Any]:
         """Properties of the shader; the inspector's colours are sRGB."""
-        colour = _srgb(_three(self.base_color)).tolist()
+        colour = encoded(_three(self.base_color)).tolist()
         return {"_BaseColor": colour, "_Metallic": float(self.metallic), "_Smoothness": 1.0 - float(self.roughness)}
 
 
 def _three(value: Any) -> Float[np.ndarray, " 3"]:
     return np.broadcast_to(np.asarray(value, float), (3,))
-
-
-def _srgb(linear: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " 3"]:
-    """IEC 61966-2-1."""
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
 
 
 @dataclasses.dataclass(frozen=True)
