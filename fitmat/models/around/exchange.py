@@ -43,7 +43,7 @@ AZIMUTHS = 4
 TRAPPED = 1e-6
 """Share of the returned light that is dropped at each bounce, so that light which never leaves has a limit."""
 
-SWEEPS = 4
+SWEEPS = 12
 """Of the search for the factors of the lobe; each halves the logarithm of what is missing."""
 
 _TINY, _ALMOST = 1e-16, 0.999

@@ -114,7 +114,7 @@ def test_smooth_coats_reflect_what_mitsuba_traces_between_two_planes(mitsuba: Mo
     """A polished face over three bases, from four directions."""
     degrees, (ours, theirs) = [0.0, 30.0, 60.0, 80.0], SLABS[base]
     for angle, value in zip(np.deg2rad(degrees), reflected(varnished(ours), degrees), strict=True):
-        mean, error = mitsuba_slab.albedo(mitsuba, theirs, angle, 1.5, None, count=60 * PHOTONS, seed=SEED)
+        mean, error = mitsuba_slab.albedo(mitsuba, theirs, angle, 1.5, None, count=80 * PHOTONS, seed=SEED)
         assert error < SHARE * mean / 3
         assert abs(value - mean) < max(SHARE * mean, 3 * error), np.rad2deg(angle)
 
