@@ -81,14 +81,24 @@ def _pull(r: Samples, loss: Loss) -> tuple[Samples, Samples]:
     return jax.jvp(lambda r: jax.jvp(half, (r,), (one,))[1], (r,), (one,))
 
 
+def noise_scales(x: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """The s whose discrepancy equals the noise of each sample, in sr^(−1/3)."""
+    return noise / (3.0 * np.cbrt(np.abs(x) + noise) ** 2)
+
+
+def first_scales(x: np.ndarray) -> np.ndarray:
+    """Of each sample a first s before anything is fitted: a tenth of ∛x."""
+    return 0.1 * np.cbrt(np.abs(x))
+
+
 def noise_scale(x: np.ndarray, noise: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """The s whose discrepancy equals the noise for the typical sample, in sr^(−1/3); NaN where there is none."""
+    """The median of `noise_scales`; NaN where there is no sample."""
     used = weight > 0
     if not used.any():
         return np.array(np.nan)
-    return np.asarray(np.median(noise[used] / (3.0 * np.cbrt(np.abs(x[used]) + noise[used]) ** 2)))
+    return np.asarray(np.median(noise_scales(x[used], noise[used])))
 
 
 def first_discrepancy(data: Any) -> np.ndarray:
-    """A first s before anything is fitted: a tenth of the typical ∛x."""
-    return np.asarray(0.1 * np.median(np.cbrt(np.abs(data.x[data.weight > 0]))))
+    """The median of `first_scales`."""
+    return np.asarray(np.median(first_scales(data.x[data.weight > 0])))

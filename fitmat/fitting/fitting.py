@@ -74,20 +74,12 @@ def fit(
     Example:
         >>> fit(read("measurements.csv"), "lambert+ggx", fixed={"ks": 1.0})  # doctest: +SKIP
     """
-    if not jax.config.read("jax_enable_x64"):
-        raise FitmatError(
-            'fitmat needs 64-bit floats: run jax.config.update("jax_enable_x64", True) before building arrays.'
-        )
+    refuse_single_precision()
     arguments.kind("to", to, str, AbstractBRDF)
     arguments.named(fixed=fixed, priors=priors)
     arguments.whole("max_steps", max_steps, 1)
     measurements = measurements_of(measurements)
-    channels = len(measurements.channels)
-    if masking is not None and not isinstance(to, str):
-        raise ModelError(
-            f"masking = {masking!r} beside a model, expected it with a name: a model has its own. Leave it out."
-        )
-    template = model(to, channels=channels, masking=masking) if isinstance(to, str) else to
+    template = asked_model(to, len(measurements.channels), masking)
     arguments.kind("dispersion", dispersion, str, optional=True)
     if dispersion is not None:
         template = dispersed(template, dispersion, measurements.channels)
@@ -124,6 +116,29 @@ def fit(
     if not found_noise.known and chosen.infers_discrepancy:
         found_noise, data, ends = proportional(measurements, shown, (found_noise, data), ends, moved, max_steps)
     return conclude(measurements, shown, held, (found_noise, data), ends)
+
+
+def refuse_single_precision() -> None:
+    """Raise `FitmatError` where JAX computes in 32 bits."""
+    if not jax.config.read("jax_enable_x64"):
+        raise FitmatError(
+            'fitmat needs 64-bit floats: run jax.config.update("jax_enable_x64", True) before building arrays.'
+        )
+
+
+def asked_model(to: str | AbstractBRDF, channels: int, masking: str | None) -> AbstractBRDF:
+    """The model that a name means, or the model itself.
+
+    Raises:
+        ModelError: the name is unknown, or a masking is given beside a model.
+    """
+    if isinstance(to, str):
+        return model(to, channels=channels, masking=masking)
+    if masking is not None:
+        raise ModelError(
+            f"masking = {masking!r} beside a model, expected it with a name: a model has its own. Leave it out."
+        )
+    return to
 
 
 def _with_jitter(

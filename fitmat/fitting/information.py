@@ -30,6 +30,9 @@ FOLLOWS, MISSES = 0.5, 2.0
 DIFFERENCE = 3e-4
 """Steps of the finite differences in standard deviations: errors of 1e-8 from curvature and from rounding."""
 
+SIDES = (-1.0, 0.0, 1.0)
+"""Where the slopes of such a difference are taken, in steps from its middle."""
+
 AT_ONCE = 16
 """Points for which the program of `normal_equations_of` is compiled."""
 
@@ -101,16 +104,37 @@ def observed_information(best: AbstractBRDF, data: Data, s: float, expected: np.
     """
     every = coordinates(best)
     here, count = every.natural(vector(best)), every.count
+    h, shift = difference_steps(every, expected, here)
+    points = here + np.concatenate([np.diag(h * (shift + side)) for side in SIDES])
+    slopes = normal_equations_of(best, data, s)(points)[1].reshape(3, count, count)
+    return hessian(slopes, h, shift)
+
+
+def difference_steps(
+    moved: Coordinates, expected: Float[np.ndarray, "... k k"], here: Float[np.ndarray, "... k"]
+) -> tuple[Float[np.ndarray, "... k"], Float[np.ndarray, "... k"]]:
+    """Steps of central differences in natural coordinates, and by how many of them a bound shifts their middle.
+
+    Args:
+        moved: The k parameters.
+        expected: JᵀJ of one fit, or of many.
+        here: Natural coordinates.
+    """
     with np.errstate(divide="ignore"):
-        sd = 1.0 / np.sqrt(np.maximum(np.diagonal(expected), 0.0))
-    h = DIFFERENCE * np.minimum(sd, every.span)
-    shift = np.where(here - h < every.low, 1.0, np.where(here + h > every.high, -1.0, 0.0))
-    points = here + np.concatenate([np.diag(h * (shift + side)) for side in (-1.0, 0.0, 1.0)])
-    before, middle, after = normal_equations_of(best, data, s)(points)[1].reshape(3, count, count)
-    slope = (after - before) / (2.0 * h[:, None])
-    bend = (after - 2.0 * middle + before) / h[:, None]
-    hessian = slope - shift[:, None] * bend  # of the parabola through the three, at the best point
-    return 0.5 * (hessian + hessian.T)
+        sd = 1.0 / np.sqrt(np.maximum(np.diagonal(expected, axis1=-2, axis2=-1), 0.0))
+    h = DIFFERENCE * np.minimum(sd, moved.span)
+    return h, np.where(here - h < moved.low, 1.0, np.where(here + h > moved.high, -1.0, 0.0))
+
+
+def hessian(
+    slopes: Float[np.ndarray, "3 ... k k"], h: Float[np.ndarray, "... k"], shift: Float[np.ndarray, "... k"]
+) -> Float[np.ndarray, "... k k"]:
+    """Of slopes at `SIDES` of each parameter, a row for each, and of `difference_steps`."""
+    before, middle, after = slopes
+    slope = (after - before) / (2.0 * h[..., None])
+    bend = (after - 2.0 * middle + before) / h[..., None]
+    found = slope - shift[..., None] * bend  # of the parabola through the three, at the best point
+    return 0.5 * (found + found.swapaxes(-1, -2))
 
 
 def information(best: AbstractBRDF, data: Data, s: float, free: np.ndarray) -> Float[np.ndarray, "p p"]:
@@ -130,12 +154,12 @@ def information(best: AbstractBRDF, data: Data, s: float, free: np.ndarray) -> F
     return observed if is_positive(observed[np.ix_(free, free)]) else expected
 
 
-def is_positive(information: np.ndarray) -> bool:
-    """Whether an information matrix is finite and, with a unit diagonal, positive definite beyond rounding."""
-    scale = np.sqrt(np.abs(np.diagonal(information)) + 1e-300)
-    if not np.isfinite(information).all():
-        return False
-    return bool(np.linalg.eigvalsh(information / np.outer(scale, scale)).min(initial=1.0) > 1e-9)
+def is_positive(information: Float[np.ndarray, "... k k"]) -> np.ndarray:
+    """Whether information matrices are finite and, with a unit diagonal, positive definite beyond rounding."""
+    finite = np.asarray(np.isfinite(information).all(axis=(-2, -1)))
+    safe = np.where(finite[..., None, None], information, np.eye(information.shape[-1]))
+    scale = np.sqrt(np.abs(np.diagonal(safe, axis1=-2, axis2=-1)) + 1e-300)
+    return finite & (np.linalg.eigvalsh(safe / _squared(scale)).min(axis=-1, initial=1.0) > 1e-9)
 
 
 def _mean_square(best: AbstractBRDF, data: Data, parameters: int) -> float:
@@ -162,6 +186,11 @@ def _squared(size: np.ndarray) -> np.ndarray:
     return size[..., :, None] * size[..., None, :]
 
 
+def limits(moved: Coordinates) -> Float[np.ndarray, " k"]:
+    """Standard deviations, natural, beyond which a parameter is not determined: `UNDETERMINED`."""
+    return np.where(moved.ratio, UNDETERMINED["log"], UNDETERMINED["linear"] * moved.extent)
+
+
 def covariance(
     best: AbstractBRDF, information: np.ndarray, moved: Coordinates, told: np.ndarray
 ) -> tuple[Float[np.ndarray, "p p"], tuple[str, ...]]:
@@ -175,7 +204,7 @@ def covariance(
     values, free, span = np.asarray(vector(best)), moved.index, moved.span
     known = information[np.ix_(free, free)]
     released = inverse_information(known, span)
-    limit = np.where(moved.ratio, UNDETERMINED["log"], UNDETERMINED["linear"] * moved.extent)
+    limit = limits(moved)
     apart = released if not told.any() else inverse_information(known[np.ix_(~told, ~told)], span[~told])
     loose = set(free[~told][~(np.sqrt(np.diagonal(apart)) <= limit[~told])])
     inside = moved.side(values) == 0

@@ -15,7 +15,7 @@ from fitmat.fitting.channelwise import Part, divides
 from fitmat.fitting.likelihood import Data
 from fitmat.fitting.stabilising import spread, stabilised
 from fitmat.models.base import AbstractBRDF
-from fitmat.models.parameters import Entry, entries, vector
+from fitmat.models.parameters import Entry, entries, holding
 from fitmat.models.values import SMALL, slices, values
 
 MAX_ROWS = SMALL[1]
@@ -74,24 +74,15 @@ def _of_some(
     part = Part(model, channels)
     few = {name: value if len(value) == 1 else value[part.which] for name, value in held.items()}
     found = starting_points(part.model, data.of_channels(part.which, part.places), s, few, count)
-    base, free = np.array(vector(model), float), []
-    for entry in entries(model):
-        if entry.name in held:
-            base[entry.place] = held[entry.name]
-        else:
-            free.append(entry.place.start)
-    return part.spread(np.tile(base, (len(found), 1)), found, free)
+    free = [entry.place.start for entry in entries(model) if entry.name not in held]
+    return part.spread(np.tile(holding(model, held), (len(found), 1)), found, free)
 
 
 def nodes(model: AbstractBRDF, shapes: Sequence[Entry], held: Mapping[str, np.ndarray]) -> Float[np.ndarray, "k p"]:
     """Parameter vectors of a grid over these parameters, everything else as in the model or as it is held."""
-    base = np.array(vector(model), float)
-    for entry in entries(model):
-        if entry.name in held:
-            base[entry.place] = held[entry.name]
     axes = [e.param.starts for e in shapes]
     chosen = list(itertools.product(*axes)) if math.prod(map(len, axes)) <= MOST_NODES else _spread_over(axes)
-    found = np.tile(base, (len(chosen), 1))
+    found = np.tile(holding(model, held), (len(chosen), 1))
     for column, entry in enumerate(shapes):
         found[:, entry.place] = np.array([node[column] for node in chosen], float)[:, None]
     return found

@@ -5,7 +5,7 @@ This room knows nothing of reflection and fits nothing.
 
 import dataclasses
 from abc import abstractmethod
-from collections.abc import Container, Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import Any, Literal, TypeVar
 
 import equinox as eqx
@@ -151,6 +151,15 @@ def with_vector(model: M, values: Any) -> M:
         parts.append(values[start:stop].reshape(np.shape(leaf)))
         start = stop
     return jax.tree.unflatten(structure, parts)
+
+
+def holding(model: eqx.Module, held: Mapping[str, Any]) -> Float[np.ndarray, " p"]:
+    """The model's parameter vector with the parameters that are held, by name, at their values."""
+    found = np.array(vector(model), float)
+    for entry in entries(model):
+        if entry.name in held:
+            found[entry.place] = held[entry.name]
+    return found
 
 
 class AbstractOfChannels(eqx.Module):

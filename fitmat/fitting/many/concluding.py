@@ -3,16 +3,23 @@
 The rules are those of `information` and of the fit's own `concluding`, for all at once. It solves nothing.
 """
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Bool, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from fitmat.fitting.concluding import RESULTS, named_outcome
-from fitmat.fitting.information import DIFFERENCE, FOLLOWS, UNDETERMINED, inverse_information
+from fitmat.fitting.information import (
+    FOLLOWS,
+    SIDES,
+    difference_steps,
+    hessian,
+    inverse_information,
+    is_positive,
+    limits,
+)
 from fitmat.fitting.likelihood import log_pointwise
 from fitmat.fitting.many.gathering import counted
 from fitmat.fitting.many.lanes import Samples, Shared, from_natural, looked, summed
@@ -124,35 +131,11 @@ def _information(
     observed = ~(s < FOLLOWS * samples.typical) if loss.linear else np.ones(len(s), bool)
     if not observed.any():
         return found.gram
-    hessian = _observed(lambda at: seen(shared, samples, at, s, block).slope, shared, found.gram, here)
-    return np.where((observed & _positive(hessian))[:, None, None], hessian, found.gram)
-
-
-def _observed(
-    slope: Callable[[np.ndarray], np.ndarray], shared: Shared, expected: np.ndarray, here: Float[np.ndarray, "T k"]
-) -> Float[np.ndarray, "T k k"]:
-    """As `information.observed_information`."""
-    moved, count = shared.moved, here.shape[1]
-    with np.errstate(divide="ignore"):
-        sd = 1.0 / np.sqrt(np.maximum(np.diagonal(expected, axis1=1, axis2=2), 0.0))
-    h = DIFFERENCE * np.minimum(sd, moved.span)
-    shift = np.where(here - h < moved.low, 1.0, np.where(here + h > moved.high, -1.0, 0.0))
-    hessian = np.empty(expected.shape)
-    for k in range(count):
-        one = np.eye(count)[k]
-        before, middle, after = (slope(here + one * h * (shift + side)) for side in (-1.0, 0.0, 1.0))
-        step = h[:, k, None]
-        hessian[:, k] = (after - before) / (2.0 * step) - shift[:, k, None] * (after - 2.0 * middle + before) / step
-    return 0.5 * (hessian + hessian.swapaxes(1, 2))
-
-
-def _positive(information: np.ndarray) -> Bool[np.ndarray, " T"]:
-    """As `information.is_positive`."""
-    finite = np.isfinite(information).all(axis=(1, 2))
-    safe = np.where(np.expand_dims(finite, (1, 2)), information, np.eye(information.shape[1]))
-    scale = np.sqrt(np.abs(np.diagonal(safe, axis1=1, axis2=2)) + 1e-300)
-    least = np.linalg.eigvalsh(safe / (scale[:, :, None] * scale[:, None, :])).min(axis=1, initial=1.0)
-    return finite & (least > 1e-9)
+    h, shift = difference_steps(shared.moved, found.gram, here)
+    each = [[here + one * h * (shift + side) for one in np.eye(shared.moved.count)] for side in SIDES]
+    slopes = [np.stack([seen(shared, samples, at, s, block).slope for at in some], axis=1) for some in each]
+    curved = hessian(np.stack(slopes), h, shift)
+    return np.where((observed & is_positive(curved))[:, None, None], curved, found.gram)
 
 
 def _spread(known: np.ndarray, shared: Shared, side: np.ndarray) -> tuple[Any, Any]:
@@ -161,9 +144,8 @@ def _spread(known: np.ndarray, shared: Shared, side: np.ndarray) -> tuple[Any, A
     As `information.covariance`: judged with every parameter released, those on a bound as well.
     """
     moved = shared.moved
-    limit = np.where(moved.ratio, UNDETERMINED["log"], UNDETERMINED["linear"] * moved.extent)
     spread = _deviations(known, moved.span)
-    loose = ~(spread <= limit).all(axis=1)
+    loose = ~(spread <= limits(moved)).all(axis=1)
     held = np.flatnonzero(~loose & (side != 0).any(axis=1))
     inside = side[held] == 0
     both = inside[:, :, None] & inside[:, None, :]

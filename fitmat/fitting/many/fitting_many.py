@@ -6,7 +6,6 @@ Likelihood, bounds, convergence and outcomes are those of `fitmat.fit`. It reads
 import os
 from collections.abc import Mapping
 
-import jax
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
@@ -14,7 +13,7 @@ from fitmat import arguments
 from fitmat._types import Progress
 from fitmat.errors import FitmatError, ModelError, ReadError
 from fitmat.fitting.coordinates import coordinates
-from fitmat.fitting.fitting import held_values
+from fitmat.fitting.fitting import asked_model, held_values, refuse_single_precision
 from fitmat.fitting.losses import DEFAULT, Loss
 from fitmat.fitting.losses import loss as find_loss
 from fitmat.fitting.many.fits import Fits
@@ -26,8 +25,7 @@ from fitmat.fitting.refining import MAX_STEPS
 from fitmat.measurements.samples import default_channels
 from fitmat.models import names
 from fitmat.models.base import AbstractBRDF, direction_pairs
-from fitmat.models.parameters import entries, vector, with_vector
-from fitmat.models.registry import model
+from fitmat.models.parameters import entries, holding, with_vector
 from fitmat.models.values import at
 
 STARTS = 3
@@ -77,10 +75,7 @@ def fit_many(
         >>> wi, wo = directions(30, degrees=True), directions([0, 15, 30, 45], 180, degrees=True)  # doctest: +SKIP
         >>> fit_many(wi, wo, texture, "lambert+ggx", fixed={"ks": 1.0})["alpha"]  # doctest: +SKIP
     """
-    if not jax.config.read("jax_enable_x64"):
-        raise FitmatError(
-            'fitmat needs 64-bit floats: run jax.config.update("jax_enable_x64", True) before building arrays.'
-        )
+    refuse_single_precision()
     arguments.kind("to", to, str, AbstractBRDF)
     arguments.named(fixed=fixed)
     for name, given in (("starts", starts), ("max_steps", max_steps)):
@@ -159,21 +154,14 @@ def shared_by_all(
     Raises:
         FitmatError: the model is unknown or has other channels, or nothing is left to fit.
     """
-    if masking is not None and not isinstance(to, str):
-        raise ModelError(
-            f"masking = {masking!r} beside a model, expected it with a name: a model has its own. Leave it out."
-        )
     if loss.infers_noise:
         raise ModelError(f"loss is {loss.name!r}, expected one that infers no noise: many fits look at no neighbours.")
-    template = model(to, channels=channels, masking=masking) if isinstance(to, str) else to
+    template = asked_model(to, channels, masking)
     held = held_values(template, names.own(template.name, {e.name for e in entries(template)}, fixed))
     moved = coordinates(template, held)
     if not moved.count:
         raise ModelError(f"every parameter of {template.name} is fixed, expected one that is not: nothing is fitted.")
-    values = np.array(vector(template), float)
-    for entry in entries(template):
-        values[entry.place] = held.get(entry.name, values[entry.place])
-    template = with_vector(template, values)
+    template = with_vector(template, holding(template, held))
     shown = at(template, *(w[:1] for w in pair)).shape[1]
     if shown not in (1, channels):
         raise ModelError(f"the model has {shown} channels and the values {channels}: expected as many.")

@@ -6,6 +6,7 @@ Noise that is not given is not looked for: all scatter then counts as the model'
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from fitmat.fitting.discrepancy import first_scales, noise_scales
 from fitmat.fitting.losses import Loss
 from fitmat.fitting.many.lanes import Samples, Shared
 from fitmat.measurements.noise import at_level
@@ -56,7 +57,7 @@ def counted(samples: Samples) -> Int[np.ndarray, " T"]:
 
 def first_discrepancies(samples: Samples) -> Float[np.ndarray, " T"]:
     """`discrepancy.first_discrepancy` of every surface; 1 where nothing is valid, or all is 0."""
-    found = 0.1 * _median(np.cbrt(np.abs(samples.x)), samples.weight)
+    found = _median(first_scales(samples.x), samples.weight)
     return np.where(found > 0.0, found, 1.0)
 
 
@@ -80,7 +81,7 @@ def _filled(part: Float[np.ndarray, "T n c"], fill: float, surfaces: int, rows: 
 
 def _typical(x: np.ndarray, noise: np.ndarray, weight: np.ndarray) -> Float[np.ndarray, " T"]:
     """`discrepancy.noise_scale` of every surface; 1 where nothing is valid."""
-    found = _median(noise / (3.0 * np.cbrt(np.abs(x) + noise) ** 2), weight)
+    found = _median(noise_scales(x, noise), weight)
     return np.where(np.isfinite(found), found, 1.0)
 
 

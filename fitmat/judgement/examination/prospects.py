@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from fitmat.fitting.coordinates import coordinates
-from fitmat.fitting.information import UNDETERMINED, inverse_information
+from fitmat.fitting.information import UNDETERMINED, inverse_information, limits
 from fitmat.maths.programs import program
 from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
@@ -114,7 +114,7 @@ def _information(
 def _verdicts(truth: AbstractBRDF, gloss: str, information: np.ndarray) -> list[Prospect]:
     every, values = coordinates(truth), np.asarray(vector(truth))
     sd = np.sqrt(np.diagonal(inverse_information(information, every.span)))
-    loose = ~(sd <= np.where(every.ratio, UNDETERMINED["log"], UNDETERMINED["linear"] * every.extent))
+    loose = ~(sd <= limits(every))
     relative = sd / np.where(every.ratio, 1.0, values)
     found = []
     for entry in entries(truth):
