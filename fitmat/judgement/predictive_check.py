@@ -9,7 +9,6 @@ import numpy as np
 
 from fitmat import arguments
 from fitmat.errors import FitmatError
-from fitmat.fitting.likelihood import misfits
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.result import Fit
 from fitmat.judgement.multiplicity import adjusted_for_many
@@ -144,8 +143,9 @@ def _seen(
     """Residuals, ln P(y_rep ≤ top), model f κ and noise of every draw, (d, n, c) each."""
     data, found = fit.data, np.empty((4, len(draws), *fit.data.x.shape))
     for part, x, noise, spread in predictions(fit, draws, s):
-        at, above = (data.loss.transform(f, noise, data.kappa, spread) for f in (x, top[:, None] * data.kappa))
-        found[0, part] = misfits(x, noise, data, spread)
+        levels = (x, data.x, top[:, None] * data.kappa)
+        at, measured, above = (data.loss.transform(f, noise, data.kappa, spread) for f in levels)
+        found[0, part] = data.weight * (measured - at)
         found[1, part] = np.where(data.weight > 0, normal.log_cdf(above - at), 0.0)
         found[2, part], found[3, part] = x, noise
     return found[0], found[1], found[2], found[3]

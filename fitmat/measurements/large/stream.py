@@ -16,8 +16,8 @@ from fitmat.text import brief
 CHUNK = 200_000
 """Most rows of a block."""
 
-PART = 12_000
-"""Most rows of the part that stands for all of them."""
+PART = 8_000
+"""Most rows of the part that stands for all of them; few enough to be fitted at once."""
 
 _GOLDEN = 0x9E3779B97F4A7C15
 # 2⁶⁴/φ: the multiples of it modulo 2⁶⁴ fill the range evenly, in step with no grid of angles.
