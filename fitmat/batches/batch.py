@@ -7,7 +7,7 @@ import dataclasses
 import io
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ import polars as pl
 
 from fitmat import arguments, files
 from fitmat._types import Progress
-from fitmat.batches import rows, workers
+from fitmat.batches import cluster, rows, workers
 from fitmat.batches.jobs import Job, digest, every_file, from_table
 from fitmat.errors import FitmatError, OutputError
 from fitmat.reports import summary
@@ -25,6 +25,12 @@ from fitmat.text import brief, visible
 
 TABLE, PAGE, PARTS = "results.parquet", "index.html", "parts"
 """What a batch leaves in its folder: the table, its page, and the rows of each file by key."""
+
+Waiting = Mapping[str, tuple[Job, str]]
+"""Key → job and the digest of its file."""
+
+Do = Callable[[Waiting], Iterator[tuple[str, workers.Rows]]]
+"""Who does what waits."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -61,6 +67,7 @@ def batch(
     reading: Mapping[str, Any] | None = None,
     studying: Mapping[str, Any] | None = None,
     processes: int | None = None,
+    scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> Batch:
     """Study every file, and write one table of all.
@@ -73,19 +80,23 @@ def batch(
         reading: Arguments of `fitmat.read` for every file.
         studying: Arguments of `fitmat.study` for every file; without "sampling" the posteriors are Laplace's.
         processes: How many work side by side; None for one for each core.
+        scheduler: Address of a Dask scheduler, such as "tcp://10.0.0.1:8786", whose workers do the work instead; they
+            must see the files under the same paths.
         progress: Called with what is done next.
 
     Returns:
         A `Batch`; a file that cannot be used is a row with its sentence.
 
     Raises:
-        FitmatError: no file is found, a table of jobs cannot be read, another batch writes there, or the disk refuses.
+        FitmatError: no file is found, a table of jobs cannot be read, another batch writes there, the disk refuses,
+            or the cluster cannot be used.
 
     Example:
         >>> batch("scans/*.csv", "results").table  # doctest: +SKIP
     """
     arguments.kind("folder", folder, str, os.PathLike)
     arguments.whole("processes", processes, 1, optional=True)
+    arguments.kind("scheduler", scheduler, str, optional=True)
     arguments.function("progress", progress)
     arguments.named(reading=reading, studying=studying)
     if not wants_all(models):
@@ -93,8 +104,17 @@ def batch(
     told = {"sampling": False} | dict(studying or {}) | {"models": models}
     listed = _jobs(sources, jobs, dict(reading or {}), told)
     target = Path(folder)
+    if scheduler is not None and processes is not None:
+        arguments.refuse("processes", processes, "None with a scheduler, whose workers are as many as they are")
     with files.alone(target):
-        return _studied(listed, target, processes or os.cpu_count() or 1, progress or (lambda *_: None))
+        return _studied(listed, target, _doing(processes, scheduler), progress or (lambda *_: None))
+
+
+def _doing(processes: int | None, scheduler: str | None) -> Do:
+    """Who does the work: these processes, or a cluster."""
+    if scheduler is not None:
+        return lambda waiting: cluster.each(waiting, scheduler)
+    return lambda waiting: workers.each(waiting, processes or os.cpu_count() or 1)
 
 
 def _jobs(sources: Any, table: Any, reading: dict[str, Any], told: dict[str, Any]) -> list[Job]:
@@ -110,7 +130,7 @@ def _jobs(sources: Any, table: Any, reading: dict[str, Any], told: dict[str, Any
     return every
 
 
-def _studied(every: Sequence[Job], target: Path, processes: int, say: Progress) -> Batch:
+def _studied(every: Sequence[Job], target: Path, do: Do, say: Progress) -> Batch:
     """The table of all jobs; rows are kept as they come."""
     done: dict[int, list[dict[str, Any]]] = {}
     keys: dict[str, list[int]] = {}
@@ -130,7 +150,7 @@ def _studied(every: Sequence[Job], target: Path, processes: int, say: Progress) 
         done |= dict.fromkeys(keys[key], found)
     lost = sum(_lost(found) for found in done.values())
     _tell(say, done, lost, len(every))
-    for key, found in workers.each(waiting, processes):
+    for key, found in do(waiting):
         if not any(row["outcome"] == rows.FAILED for row in found):
             files.write_text(target / PARTS / f"{key}.json", json.dumps(found))
         done |= dict.fromkeys(keys[key], found)

@@ -3,6 +3,7 @@
 It fits nothing itself.
 """
 
+import logging
 import signal
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -34,7 +35,7 @@ def run(
     jobs: Path | None,
     reading: Mapping[str, Any],
     studying: Mapping[str, Any],
-    processes: int | None,
+    doing: Mapping[str, Any],
 ) -> Batch:
     """The batch; Ctrl-C ends it, and what was done is kept.
 
@@ -44,7 +45,7 @@ def run(
         jobs: Table of what differs from file to file.
         reading: Arguments of `fitmat.read`.
         studying: Arguments of `fitmat.study`, models included.
-        processes: How many work side by side.
+        doing: How many processes work side by side, or the scheduler of a cluster.
 
     Raises:
         FitmatError: as `batch`.
@@ -53,9 +54,11 @@ def run(
     told = dict(studying)
     models = told.pop("models")
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    if doing["scheduler"] is not None:
+        logging.disable(logging.ERROR)  # Dask tells at length what becomes one sentence
     try:
         with session.watch() as watch:
-            known = {"jobs": jobs, "reading": reading, "studying": told, "processes": processes}
+            known = {"jobs": jobs, "reading": reading, "studying": told, **doing}
             return batch(sources, folder, models, progress=watch, **known)
     except KeyboardInterrupt:
         process.say(f"fitmat: interrupted; what was done is kept in {folder}: the same command goes on.", err=True)
@@ -70,7 +73,7 @@ def is_texture(sources: Sequence[Path]) -> bool:
 def texture(
     source: Path,
     folder: Path,
-    jobs: Path | None,
+    idle: Mapping[str, Any],
     reading: Mapping[str, Any],
     studying: Mapping[str, Any],
     processes: int | None,
@@ -80,7 +83,7 @@ def texture(
     Args:
         source: The atlas.
         folder: Where to.
-        jobs: As the other flags of no use here, which are refused.
+        idle: Other flags, all of no use here, which are refused.
         reading: Arguments of `fitmat.read`.
         studying: Arguments of `fitmat.study`, of which a texture takes some.
         processes: How many threads work side by side.
@@ -89,12 +92,12 @@ def texture(
         FitmatError: as `fit_texture`, or a flag is of no use to a texture.
         SystemExit: it was interrupted.
     """
-    said = {"jobs": jobs, **reading, **reading["constants"], **studying, "instrument": not reading["instrument"].ideal}
-    idle = [
+    said = {**idle, **reading, **reading["constants"], **studying, "instrument": not reading["instrument"].ideal}
+    refused = [
         name for name, given in said.items() if name not in (*TEXTURE, "constants") and given not in (None, False, {})
     ]
-    if idle:
-        raise FitmatError(f"{source} is a texture, for which {idle[0]} means nothing: expected no flag for it.")
+    if refused:
+        raise FitmatError(f"{source} is a texture, for which {refused[0]} means nothing: expected no flag for it.")
     models = studying["models"]
     model = DEFAULT_MODELS[-1] if models == ",".join(DEFAULT_MODELS) else models
     if "," in model:

@@ -10,7 +10,7 @@ import typer
 
 from fitmat.cli import examples, process
 from fitmat.cli.entry import app
-from fitmat.cli.flags.batch import BatchOutFlag, JobsFlag, McmcFlag, ProcessesFlag, SourcesFlag
+from fitmat.cli.flags.batch import BatchOutFlag, JobsFlag, McmcFlag, ProcessesFlag, SchedulerFlag, SourcesFlag
 from fitmat.cli.flags.design import CountFlag, ForFlag, KindFlag
 from fitmat.cli.flags.files import (
     ConvertedFlag,
@@ -270,6 +270,7 @@ def batch(
     jobs: JobsFlag = None,
     models: ModelsFlag = MODELS,
     processes: ProcessesFlag = None,
+    scheduler: SchedulerFlag = None,
     mcmc: McmcFlag = False,
     seed: SeedFlag = 0,
     fix: FixFlag = None,
@@ -288,8 +289,8 @@ def batch(
     told |= {"dispersion": dispersion, "sampling": mcmc} | fit.known(fix or [], prior or [])
     read = reading | {"instrument": instrument}
     if batch.is_texture(files or []):
-        return batch.texture((files or [])[0], out, jobs, read, told, processes)
-    found = batch.run(files or [], out, jobs, read, told, processes)
+        return batch.texture((files or [])[0], out, {"jobs": jobs, "scheduler": scheduler}, read, told, processes)
+    found = batch.run(files or [], out, jobs, read, told, {"processes": processes, "scheduler": scheduler})
     batch.show(found)
     if found.counts["refused"]:
         raise typer.Exit(NOT_CONVERGED)

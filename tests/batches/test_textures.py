@@ -236,6 +236,7 @@ def test_the_command_fits_a_texture(atlas: Path, tmp_path: Path) -> None:
         (["--models", "lambert,ggx"], "expected one: every point has the same model"),
         (["--tilt"], "is a texture, for which tilt means nothing"),
         (["--mcmc"], "is a texture, for which sampling means nothing"),
+        (["--scheduler", "tcp://10.0.0.1:8786"], "is a texture, for which scheduler means nothing"),
         (["--theta-i", "30"], "is a texture, for which theta_i means nothing"),
     ],
 )

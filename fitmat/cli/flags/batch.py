@@ -36,6 +36,16 @@ ProcessesFlag = Annotated[
     typer.Option(min=1, help="How many files at once; default one for each core.", metavar="N", show_default=False),
 ]
 
+SchedulerFlag = Annotated[
+    str | None,
+    typer.Option(
+        help="Dask scheduler whose workers do the work, such as tcp://10.0.0.1:8786; they must see the files under the "
+        "same paths, and have one thread each.",
+        metavar="ADDRESS",
+        show_default=False,
+    ),
+]
+
 McmcFlag = Annotated[
     bool, typer.Option("--mcmc", help="Sample every posterior; slower, else intervals from Laplace's approximation.")
 ]
