@@ -18,9 +18,11 @@ from materials import reconstructions
 from tables import replace_between, to_markdown
 
 import fitmat as fm
-from fitmat.exports import gltf, materialx, materialx_models, metallic_roughness
+from fitmat.exports import gltf, metallic_roughness
 from fitmat.exports.closest import Closest, channels, judged
 from fitmat.exports.material import Chosen, chosen
+from fitmat.exports.materialx import document
+from fitmat.exports.materialx.models import template
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.conversion import alpha_from_exponent
 from fitmat.models.parameters import entries, vector, with_vector
@@ -89,9 +91,9 @@ def both(what: Chosen) -> dict[str, tuple[Closest, Closest]]:
     count, told = channels(what), looks(what.model)
     templates = {
         "glTF": metallic_roughness.template(what.model, count)[0],
-        "OpenPBR": materialx_models.template(count)[0],
+        "OpenPBR": template(count)[0],
     }
-    found = {"glTF": gltf.translated(what), "OpenPBR": materialx.open_surface(what).found}
+    found = {"glTF": gltf.translated(what), "OpenPBR": document.open_surface(what).found}
     result = {}
     for target, into in templates.items():
         near = found[target]

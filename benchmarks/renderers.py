@@ -14,12 +14,13 @@ import jax
 import numpy as np
 
 import fitmat as fm
-from fitmat.exports import browser, mitsuba, shaders
+from fitmat.exports import mitsuba
 from fitmat.exports.closest import Closest
+from fitmat.exports.glsl import browser, shaders
+from fitmat.exports.glsl.shaders import DESKTOP, Shader
+from fitmat.exports.glsl.translation import translated
 from fitmat.exports.material import Chosen
-from fitmat.exports.shaders import DESKTOP, Shader
 from fitmat.exports.targets import TARGETS
-from fitmat.exports.translation import translated
 from fitmat.exports.verification import Difference, compared, directions, exact, run
 from fitmat.models.base import AbstractBRDF, evaluate
 

@@ -7,27 +7,13 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from fitmat.exports import (
-    blender,
-    cycles,
-    gltf,
-    klems,
-    materialx,
-    materialx_shader,
-    mitsuba,
-    osl,
-    pbrt,
-    radiance,
-    shaders,
-    table,
-    translation,
-    usd,
-    verification,
-    zemax,
-)
+from fitmat.exports import gltf, klems, mitsuba, osl, pbrt, radiance, table, usd, verification, zemax
+from fitmat.exports.blender import cycles, script
 from fitmat.exports.closest import Closest
 from fitmat.exports.game_engines import UNITY, UNREAL
+from fitmat.exports.glsl import shaders, translation
 from fitmat.exports.material import Chosen
+from fitmat.exports.materialx import document, generated
 from fitmat.exports.verification import Difference
 
 
@@ -112,19 +98,19 @@ TARGETS = {
     "gltf": Target("glTF 2.0", gltf.translated, gltf.texts, gltf.difference, gltf.notes, _facts),
     "materialx": Target(
         "MaterialX 1.39.5",
-        materialx.translated,
-        materialx.texts,
-        materialx_shader.difference,
-        materialx.notes,
-        materialx.facts,
+        document.translated,
+        document.texts,
+        generated.difference,
+        document.notes,
+        document.facts,
     ),
     "openpbr": Target(
         "OpenPBR 1.1.1 in MaterialX 1.39.5",
-        materialx.open_surface,
-        materialx.texts,
-        materialx_shader.difference,
-        materialx.notes,
-        materialx.facts,
+        document.open_surface,
+        document.texts,
+        generated.difference,
+        document.notes,
+        document.facts,
     ),
     "usd": Target("OpenUSD's UsdPreviewSurface", usd.translated, usd.texts, usd.difference, _words, _facts),
     "radiance": Target(
@@ -136,10 +122,10 @@ TARGETS = {
     "klems": Target("a Klems matrix", klems.translated, klems.texts, klems.difference, klems.notes),
     "blender": Target(
         "Blender's Principled BSDF, in Cycles 5.0",
-        blender.translated,
-        blender.texts,
-        lambda chosen, found: cycles.difference(chosen.model, blender.code("material", found)),
-        blender.notes,
+        script.translated,
+        script.texts,
+        lambda chosen, found: cycles.difference(chosen.model, script.code("material", found)),
+        script.notes,
         _facts,
     ),
     "osl": Target(

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.errors import OutputError
-from fitmat.exports import browser
+from fitmat.exports.glsl import browser
 from fitmat.maths.directions import from_angles, mirror, relative_azimuth, zenith
 from fitmat.models.base import AbstractBRDF, evaluate
 from fitmat.text import brief
@@ -148,7 +148,7 @@ def run(
     told["sources"] = [{"text": text, "uniforms": values} for text, values in each]
     told |= {name: base64.b64encode(w).decode("ascii") for name, w in zip(("wi", "wo"), padded, strict=True)}
     given = json.dumps(told).replace("<", "\\u003c")  # which would end the script
-    page, script = (files("fitmat.exports").joinpath(name).read_text(encoding="utf-8") for name in PAGE)
+    page, script = (files("fitmat.exports.glsl").joinpath(name).read_text(encoding="utf-8") for name in PAGE)
     page = page.replace("SHADER", script, 1).replace("GIVEN", given, 1)
     found = json.loads(browser.written(page, program))
     for one in (found, *found.get("sources", [])):

@@ -1,7 +1,7 @@
 """GLSL: what a formula is in the language of shaders, said beside it; and how numbers are written there.
 
 Puts nothing together: `exports` does. A text holds declarations in GLSL ES 3.00 in which parameters, and what other
-parts of the same lobe declare, have their own short names; what several lobes share is in `exports/terms.glsl`.
+parts of the same lobe declare, have their own short names; what several lobes share is in `exports/glsl/terms.glsl`.
 """
 
 from collections.abc import Iterable

@@ -14,7 +14,7 @@ from jaxtyping import Float
 from fitmat.colour.channels import colouring
 from fitmat.colour.spaces import FROM_SRGB
 from fitmat.errors import ModelError
-from fitmat.exports.translation import COLOURS, Parametrised, parametrised
+from fitmat.exports.glsl.translation import COLOURS, Parametrised, parametrised
 from fitmat.match.appearance import scene
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import Entry, Param, entries, vector, with_vector
@@ -30,7 +30,7 @@ DRAWS = 60
 """Posterior draws that a page holds, of each model."""
 
 SCRIPTS = (
-    ("fitmat.exports", "shader.js"),
+    ("fitmat.exports.glsl", "shader.js"),
     *(
         ("fitmat.reports", f"static/{name}")
         for name in ("scene.js", "controls.js", "ball.js", "solids.js", "lobes.js", "mounting.js")

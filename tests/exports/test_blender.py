@@ -13,9 +13,9 @@ from test_materialx import pairs
 
 import fitmat as fm
 from fitmat.errors import ModelError, OutputError
-from fitmat.exports import blender, cycles
+from fitmat.exports.blender import cycles, script
+from fitmat.exports.blender.models import Coated, Drawn, Principled
 from fitmat.exports.closest import Closest
-from fitmat.exports.cycles_models import Coated, Drawn, Principled
 from fitmat.exports.metallic_roughness import Squared
 from fitmat.exports.verification import TOLERANCE
 from fitmat.models.base import AbstractBRDF, evaluate
@@ -80,7 +80,7 @@ def program() -> str:
 def test_cycles_has_the_models_values(name: str) -> None:
     """Over 12,288 pairs of directions; with the roughness changed they are others."""
     program()
-    made = blender.code("m", written(RUN[name]))
+    made = script.code("m", written(RUN[name]))
     found = cycles.difference(RUN[name], made)
     assert found is not None
     assert found.largest < TOLERANCE, found.words
@@ -114,7 +114,7 @@ def test_the_text_makes_the_material_and_nothing_else() -> None:
     """Whatever the name holds: Python in ASCII of the same statements, with the sockets' own units."""
     name = 'it\'s "é*/ --> ]]> \\ \n\u202e """\nimport os'
     plain, odd = (
-        blender.texts(file, [json.dumps(said)], written(RUN["brushed"])) for file, said in (("m", "m"), ("é", name))
+        script.texts(file, [json.dumps(said)], written(RUN["brushed"])) for file, said in (("m", "m"), ("é", name))
     )
     (benign,), (hostile,) = plain.values(), odd.values()
     assert hostile.isascii()
@@ -125,11 +125,11 @@ def test_the_text_makes_the_material_and_nothing_else() -> None:
     assert values["Base Color"] == [0.8, 0.4, 0.1, 1.0]
     assert values["Anisotropic Rotation"] == pytest.approx(30.0 / 360.0)
     assert "ShaderNodeTangent" in benign
-    assert "ShaderNodeTangent" not in blender.code("m", written(SATIN))
+    assert "ShaderNodeTangent" not in script.code("m", written(SATIN))
 
 
 def test_a_blender_that_fails_is_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made = blender.code("m", written(SATIN))
+    made = script.code("m", written(SATIN))
     monkeypatch.setattr(cycles, "program", lambda: None)
     assert cycles.difference(SATIN, made) is None
     for text, sentence in (("echo no >&2; exit 1", r"cannot run the material \(no\)"), ("exit 0", "made no values of")):

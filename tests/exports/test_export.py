@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 import fitmat as fm
 from fitmat.cli.application import app
 from fitmat.errors import FitmatError, ModelError, OutputError
-from fitmat.exports import browser
 from fitmat.exports import export as room
+from fitmat.exports.glsl import browser
 from fitmat.exports.verification import Difference
 from fitmat.models.parameters import entries, vector
 from fitmat.studies.result import FORMAT

@@ -16,8 +16,9 @@ from lanes import mapped
 
 import fitmat as fm
 from fitmat.errors import ModelError, OutputError
-from fitmat.exports import browser, verification
-from fitmat.exports.translation import ascii_only, translated
+from fitmat.exports import verification
+from fitmat.exports.glsl import browser
+from fitmat.exports.glsl.translation import ascii_only, translated
 from fitmat.exports.verification import SHAPE, TOLERANCE, Difference, compared, directions, exact, run
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.registry import LOBES, lobe_names

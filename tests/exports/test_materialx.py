@@ -11,9 +11,10 @@ from oracles import materialx_genglsl as genglsl
 
 import fitmat as fm
 from fitmat.errors import ModelError, OutputError
-from fitmat.exports import browser, materialx, materialx_shader
+from fitmat.exports.glsl import browser
 from fitmat.exports.material import Chosen
-from fitmat.exports.materialx_models import Compensated, OpenPBR, RoughDiffuse
+from fitmat.exports.materialx import document, generated
+from fitmat.exports.materialx.models import Compensated, OpenPBR, RoughDiffuse
 from fitmat.maths.directions import from_angles
 from fitmat.models.base import AbstractBRDF, evaluate
 from fitmat.models.terms.distributions import Anisotropic, Isotropic
@@ -96,8 +97,8 @@ def test_materialxs_own_shader_has_the_models_values(name: str) -> None:
     if isinstance(model, OpenPBR):
         nodes = (("open_pbr_surface", {key: ("color3" if np.ndim(v) else "float", v) for key, v in SURFACE.items()}),)
     else:
-        nodes = (materialx._node(model),)
-    found = materialx_shader.difference(Chosen(model), materialx.Document(nodes, None))
+        nodes = (document._node(model),)
+    found = generated.difference(Chosen(model), document.Document(nodes, None))
     assert found is not None
     assert found.largest < AGREE, found.words
     if name not in CHANGED:
@@ -106,7 +107,7 @@ def test_materialxs_own_shader_has_the_models_values(name: str) -> None:
     key = "specular_roughness" if name == "open-pbr" else "roughness"
     kind = inputs[key][0]
     wrong: Any = inputs | {key: (kind, [0.35, 0.35] if kind == "vector2" else 0.6)}
-    other = materialx_shader.difference(Chosen(model), materialx.Document(((category, wrong),), None))
+    other = generated.difference(Chosen(model), document.Document(((category, wrong),), None))
     assert other is not None
     assert other.largest > 0.05
 
@@ -116,7 +117,7 @@ def test_a_document_that_is_not_valid_is_refused() -> None:
     chromium_and_materialx()
     wrong: Any = (("oren_nayar_diffuse_bsdf", {"colour": ("color3", K)}),)
     with pytest.raises(OutputError, match=r"MaterialX 1\.\S+ refuses the document"):
-        materialx_shader.difference(Chosen(RUN["lambert"]), materialx.Document(wrong, None))
+        generated.difference(Chosen(RUN["lambert"]), document.Document(wrong, None))
 
 
 def elements(text: str) -> list[str]:

@@ -9,7 +9,8 @@ from test_blender import C, program
 
 import fitmat as fm
 from fitmat.errors import ModelError
-from fitmat.exports import cycles, osl
+from fitmat.exports import osl
+from fitmat.exports.blender import cycles
 from fitmat.exports.material import Chosen
 from fitmat.exports.verification import TOLERANCE
 from fitmat.models.base import AbstractBRDF

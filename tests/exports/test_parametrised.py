@@ -7,7 +7,7 @@ import pytest
 from test_glsl import COVERED, NAMES, TOLERANCE, chromium, own, sharp
 
 import fitmat as fm
-from fitmat.exports.translation import Parametrised, parametrised, translated
+from fitmat.exports.glsl.translation import Parametrised, parametrised, translated
 from fitmat.exports.verification import compared, directions, exact, run
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import bounds, entries, vector, with_vector

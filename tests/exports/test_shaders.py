@@ -10,9 +10,9 @@ from test_glsl import COVERED, FEW, GILT, HOSTILE, NAMES, drawn, met, radiance, 
 
 import fitmat as fm
 from fitmat.errors import ModelError, OutputError
-from fitmat.exports import browser, shaders
-from fitmat.exports.shaders import DESKTOP, ES, Shader
-from fitmat.exports.translation import translated
+from fitmat.exports.glsl import browser, shaders
+from fitmat.exports.glsl.shaders import DESKTOP, ES, Shader
+from fitmat.exports.glsl.translation import translated
 from fitmat.models.base import AbstractBRDF
 
 VERSIONS = {"glsl": "300 es", "glsl-330": "330"}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import fitmat as fm
-from fitmat.exports import browser
+from fitmat.exports.glsl import browser
 from fitmat.match.appearance import scene
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector, with_vector

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import fitmat as fm
-from fitmat.exports import browser
+from fitmat.exports.glsl import browser
 from fitmat.reports import page, rendering
 from fitmat.studies import figures, record
 from fitmat.studies.study import Study, study

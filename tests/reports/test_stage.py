@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import fitmat as fm
-from fitmat.exports import browser
+from fitmat.exports.glsl import browser
 from fitmat.models.around.shown import surface
 from fitmat.models.parameters import vector
 from fitmat.reports import ball

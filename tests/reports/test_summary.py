@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from fitmat.exports import browser
+from fitmat.exports.glsl import browser
 from fitmat.reports import summary
 
 PLANTED = "<script>document.title='owned'</script>"

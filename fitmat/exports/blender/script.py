@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from fitmat.exports.blender.models import Coated, template
 from fitmat.exports.closest import Closest, closest, coloured
-from fitmat.exports.cycles_models import Coated, template
 from fitmat.exports.material import Chosen
 
 SOCKETS = {

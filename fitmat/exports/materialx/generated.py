@@ -9,9 +9,9 @@ import re
 from typing import Any
 
 from fitmat.errors import OutputError
-from fitmat.exports import browser
+from fitmat.exports.glsl import browser
 from fitmat.exports.material import Chosen
-from fitmat.exports.materialx import Document, xml
+from fitmat.exports.materialx.document import Document, xml
 from fitmat.exports.verification import Difference, compared, directions, exact, run
 from fitmat.models.base import evaluate
 

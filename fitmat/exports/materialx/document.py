@@ -13,7 +13,7 @@ import numpy as np
 from fitmat.errors import ModelError
 from fitmat.exports.closest import Closest, closest, coloured
 from fitmat.exports.material import Chosen
-from fitmat.exports.materialx_models import Compensated, RoughDiffuse, template
+from fitmat.exports.materialx.models import Compensated, RoughDiffuse, template
 from fitmat.models.base import AbstractBRDF, Sum
 from fitmat.models.lobes.kulla_conty import KullaConty
 from fitmat.models.lobes.lambert import Lambert

@@ -97,7 +97,7 @@ def texts(name: str, header: Sequence[str], shader: Shader) -> dict[str, str]:
         before = re.sub(r"^precision .*\n", "", before, flags=re.MULTILINE).lstrip()
     after = AFTER
     if shader.bump:
-        heights = files("fitmat.exports").joinpath("bump.glsl").read_text(encoding="utf-8")
+        heights = files("fitmat.exports.glsl").joinpath("bump.glsl").read_text(encoding="utf-8")
         after = f"\n{heights}{AFTER.replace(SMOOTH, BUMPED)}"
     return {
         f"{name}.glsl": comment + "\n" + shader.brdf,

@@ -104,7 +104,7 @@ def run(code: str, beside: Mapping[str, str] | None = None) -> tuple[np.ndarray,
         np.save(folder / "facets.npy", corners)
         told = {"code": code, "size": SIZE, "lights": light.tolist()}
         (folder / "told.json").write_text(json.dumps(told), encoding="utf-8")
-        script = str(files("fitmat.exports").joinpath("blender_scene.py"))
+        script = str(files("fitmat.exports.blender").joinpath("scene.py"))
         command = [str(found), "--background", "--factory-startup", "--python", script, "--", name]
         _ended(command)
         if not (folder / "values.npy").exists():

@@ -212,7 +212,7 @@ def _letter(letter: str) -> str:
 @functools.cache
 def _terms() -> list[tuple[set[str], str]]:
     """The shared declarations: what each declares, and its text."""
-    text = files("fitmat.exports").joinpath("terms.glsl").read_text(encoding="utf-8")
+    text = files("fitmat.exports.glsl").joinpath("terms.glsl").read_text(encoding="utf-8")
     return [(set(_DECLARED.findall(part)), part.strip("\n")) for part in text.split("\n\n")[1:]]
 
 
