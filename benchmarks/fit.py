@@ -23,7 +23,8 @@ from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.discrepancy import first_discrepancy
 from fitmat.fitting.likelihood import Data, every_residual, prepare, transformed
 from fitmat.fitting.refining import LITTLE_DAMPING, MANY_ROWS
-from fitmat.maths.least_squares import Minimum, Normal, least_squares, normal_equations
+from fitmat.maths.grams import Normal
+from fitmat.maths.least_squares import Minimum, least_squares, normal_equations
 from fitmat.measurements.noise import measured_noise
 from fitmat.measurements.samples import Measurements
 from fitmat.models.parameters import vector, with_vector

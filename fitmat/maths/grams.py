@@ -7,12 +7,16 @@ slopes as there are kinds of parameters, however many channels follow, and is so
 import dataclasses
 import functools
 from abc import abstractmethod
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+
+ROUNDING = 1e-15
+"""At least this fraction of the largest eigenvalue is added to the diagonal, roughly: the factor stays finite."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,6 +72,14 @@ class AbstractGram(eqx.Module):
     @abstractmethod
     def dense(self) -> Float[Array, "p p"]:
         """The matrix."""
+
+
+class Normal(NamedTuple):
+    """What a Gauss–Newton step needs of all residuals: Σ r², Jᵀr and JᵀJ."""
+
+    square: Float[Array, ""]
+    slope: Float[Array, " p"]
+    gram: AbstractGram
 
 
 class Whole(AbstractGram):

@@ -11,14 +11,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from fitmat.maths.grams import AbstractGram, Arrow, Layout, Whole, joined
+from fitmat.maths.grams import ROUNDING, Arrow, Layout, Normal, Whole, joined
 
 RTOL = 1e-8
 """Relative tolerance of the steps in units of each parameter's own scale, SciPy's default; convergence is quadratic."""
-
-ROUNDING = 1e-15
-"""λ is at least this fraction of the largest eigenvalue of JᵀJ, roughly: its factor stays finite."""
-
 
 FEW = 8
 """Parameters of which each has its own code for its column of J: twice as fast to run as one code for all of them, but
@@ -35,14 +31,6 @@ class Residuals(NamedTuple):
 
     columns: Float[Array, "m c"]
     single: Float[Array, " p"]
-
-
-class Normal(NamedTuple):
-    """What a Gauss–Newton step needs of all residuals: Σ r², Jᵀr and JᵀJ."""
-
-    square: Float[Array, ""]
-    slope: Float[Array, " p"]
-    gram: AbstractGram
 
 
 class Minimum(eqx.Module):

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Bool
 
-from fitmat.maths.least_squares import ROUNDING, Normal
+from fitmat.maths.grams import ROUNDING, Normal
 
 FIRST_DAMPING = 1e-3
 """The first λ relative to the diagonal of JᵀJ: starts from a grid are close, and a bad step is taken back."""

@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from fitmat.maths.grams import Arrow, Layout, Whole, joined
-from fitmat.maths.least_squares import Normal, Residuals, least_squares, normal_equations
+from fitmat.maths.grams import Arrow, Layout, Normal, Whole, joined
+from fitmat.maths.least_squares import Residuals, least_squares, normal_equations
 
 SAME = 1e-12
 """Relative to the largest number; sums of some tens of products in another order."""

@@ -15,8 +15,7 @@ from jaxtyping import Array, Bool, Float
 from fitmat.fitting.coordinates import Coordinates
 from fitmat.fitting.likelihood import Data
 from fitmat.fitting.losses import Loss
-from fitmat.maths.grams import Whole
-from fitmat.maths.least_squares import Normal
+from fitmat.maths.grams import Normal, Whole
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector
 

@@ -14,8 +14,8 @@ from fitmat.fitting.discrepancy import best_discrepancy
 from fitmat.fitting.likelihood import log_pointwise
 from fitmat.fitting.many.lanes import Samples, Shared, alone, from_unbounded, looked, summed
 from fitmat.fitting.refining import BURST, SETTLED, STEADY
-from fitmat.maths.grams import Whole
-from fitmat.maths.least_squares import RTOL, Normal, relative_offset
+from fitmat.maths.grams import Normal, Whole
+from fitmat.maths.least_squares import RTOL, relative_offset
 from fitmat.maths.levenberg_marquardt import LevenbergMarquardt
 from fitmat.maths.programs import program_run_often
 
