@@ -64,6 +64,9 @@ class Export:
         ]
         if self.difference is not None and self.difference.beyond:
             lines.append(f"{self.difference.beyond} directions are further apart than {TOLERANCE:g}.")
+        executor = TARGETS[self.target].executor
+        if self.difference is None and executor:
+            lines.append(f"Where there is {executor}, it is run and compared with the model.")
         lines[1:1] = self.notes
         return "\n".join(lines)
 

@@ -38,6 +38,7 @@ class Target(NamedTuple):
         notes: The same → what differs from the model, as sentences; `strict` refuses where there are any.
         facts: Form → what the record holds besides.
         options: What else of it can be chosen: theta_i and step of a grid of angles, bump of a shader.
+        executor: Programs that `difference` needs; none where it needs none, or where nothing runs it.
     """
 
     title: str
@@ -47,9 +48,18 @@ class Target(NamedTuple):
     notes: Callable[[Chosen, Any], Sequence[str]] = _none
     facts: Callable[[Any], Mapping[str, Any]] = _nothing
     options: tuple[str, ...] = ()
+    executor: str = ""
 
 
 GRID = ("theta_i", "step")
+
+CHROMIUM, BLENDER = "Chromium", "Blender"
+
+MATERIALX = "MaterialX (pip install MaterialX) and Chromium"
+
+MITSUBA = "Mitsuba (pip install mitsuba)"
+
+RADIANCE = "Radiance (rtrace, or pip install pyradiance)"
 
 
 def _words(chosen: Chosen, found: Closest) -> Sequence[str]:
@@ -82,7 +92,7 @@ def _shader(version: str) -> Target:
         return dataclasses.replace(found, executor=f"{found.executor} as GLSL ES 3.00{taken}")
 
     title = "GLSL ES 3.00" if version == shaders.ES else "GLSL 3.30"
-    return Target(title, translate, shaders.texts, difference, options=("bump",))
+    return Target(title, translate, shaders.texts, difference, options=("bump",), executor=CHROMIUM)
 
 
 TARGETS = {
@@ -94,6 +104,7 @@ TARGETS = {
         mitsuba.texts,
         lambda chosen, plugin: mitsuba.difference(chosen.model, plugin),
         lambda chosen, plugin: mitsuba.notes(chosen.model),
+        executor=MITSUBA,
     ),
     "gltf": Target("glTF 2.0", gltf.translated, gltf.texts, gltf.difference, gltf.notes, _facts),
     "materialx": Target(
@@ -103,6 +114,7 @@ TARGETS = {
         generated.difference,
         document.notes,
         document.facts,
+        executor=MATERIALX,
     ),
     "openpbr": Target(
         "OpenPBR 1.1.1 in MaterialX 1.39.5",
@@ -111,15 +123,22 @@ TARGETS = {
         generated.difference,
         document.notes,
         document.facts,
+        executor=MATERIALX,
     ),
     "usd": Target("OpenUSD's UsdPreviewSurface", usd.translated, usd.texts, usd.difference, _words, _facts),
     "radiance": Target(
-        "Radiance's plastic or metal", radiance.translated, radiance.texts, radiance.difference, _words, _facts
+        "Radiance's plastic or metal",
+        radiance.translated,
+        radiance.texts,
+        radiance.difference,
+        _words,
+        _facts,
+        executor=RADIANCE,
     ),
     "pbrt": Target("pbrt-v4", pbrt.translated, pbrt.texts, _unexecuted, pbrt.notes, _facts),
     "unreal": Target("Unreal Engine's Default Lit", UNREAL.translated, UNREAL.texts, UNREAL.difference, _words, _facts),
     "unity": Target("Lit of Unity's URP", UNITY.translated, UNITY.texts, UNITY.difference, _words, _facts),
-    "klems": Target("a Klems matrix", klems.translated, klems.texts, klems.difference, klems.notes),
+    "klems": Target("a Klems matrix", klems.translated, klems.texts, klems.difference, klems.notes, executor=RADIANCE),
     "blender": Target(
         "Blender's Principled BSDF, in Cycles 5.0",
         script.translated,
@@ -127,6 +146,7 @@ TARGETS = {
         lambda chosen, found: cycles.difference(chosen.model, script.code("material", found)),
         script.notes,
         _facts,
+        executor=BLENDER,
     ),
     "osl": Target(
         "OSL, in Cycles 5.0",
@@ -135,6 +155,7 @@ TARGETS = {
         lambda chosen, closures: cycles.difference(chosen.model, osl.CODE, {"material.osl": osl.shader(closures)}),
         osl.notes,
         osl.facts,
+        executor=BLENDER,
     ),
     "table": Target("a table of angles", table.measured, table.texts, table.difference, options=GRID),
     "zemax": Target("Zemax's tabulated BSDF", zemax.translated, zemax.texts, zemax.difference, options=GRID),

@@ -32,7 +32,7 @@ WAYS = {
     "indices": "the exact equations with η and κ averaged over what each channel responds to",
     "closest": "the exact equations with the η and κ whose curve comes closest in each channel",
     "schlick": "Schlick's curve from F0 in RGB",
-    "f82": "Hoffman's curve from F0 and F82 in RGB",
+    "f82": "Hoffman's curve from F0 and F82 in RGB, cut at 1",
     "belcour": "Belcour's terms, integrated in each channel",
 }
 """How renderers compute Fresnel's reflectance with three numbers a term; name → in words."""

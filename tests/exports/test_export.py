@@ -61,7 +61,7 @@ def test_an_export_is_its_files(tmp_path: Path) -> None:
     assert (record["model"], record["files"], record["executed"]) == ("lambert", FILES[:3], None)
     assert made.files["m.frag"].startswith('#version 300 es\n// "m": lambert, GLSL ES 3.00, by fitmat ')
     assert "// Not executed here.\n" in made.files["m.glsl"]
-    assert str(made).endswith("Not executed here.")
+    assert str(made).endswith("Not executed here.\nWhere there is Chromium, it is run and compared with the model.")
     assert made.files["m.glsl"].partition("const ")[2] in made.files["m.frag"]
 
 
