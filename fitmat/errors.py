@@ -22,3 +22,16 @@ class OutputError(FitmatError):
 
 class ReadAs(UserWarning):
     """Something was given in another form than the model's; the sentence says in which convention it was read."""
+
+
+def exhausted(error: BaseException) -> str:
+    """What the machine had too little of, as a sentence; empty where the error is another one.
+
+    XLA says of memory that it is "RESOURCE_EXHAUSTED", Python of threads that it "can't start" one.
+    """
+    if isinstance(error, MemoryError) or "RESOURCE_EXHAUSTED" in str(error):
+        return "there is not enough memory; take fewer models or rows at once, or a machine with more."
+    if "can't start new thread" in str(error):
+        got = "the machine grants no more threads to this user"
+        return f"{got}, expected some tens. End other programs, or raise the limit of processes (ulimit -u)."
+    return ""

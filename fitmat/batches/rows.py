@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fitmat.errors import FitmatError
+from fitmat.errors import FitmatError, exhausted
 from fitmat.match.match import Match
 from fitmat.studies import record
 from fitmat.studies.cards import best, cards
@@ -63,9 +63,10 @@ def refused(error: FitmatError) -> list[dict[str, Any]]:
 
 
 def failed(error: BaseException) -> list[dict[str, Any]]:
-    """The row of a file that fitmat stumbled over."""
+    """The row of a file that fitmat stumbled over, or for which the machine had too little."""
     words = str(error).partition("\n")[0]
-    return [{"outcome": FAILED, "message": f"{type(error).__name__}: {words}. Please report it, with the file."}]
+    ours = f"{type(error).__name__}: {words}. Please report it, with the file."
+    return [{"outcome": FAILED, "message": exhausted(error) or ours}]
 
 
 def _one(found: Findings) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from fitmat.batches import rows
 from fitmat.batches.jobs import Job, digest
 from fitmat.errors import FitmatError, ReadError
 from fitmat.measurements.reader import read
+from fitmat.measurements.samples import Measurements
 from fitmat.studies.study import study
 
 DIED = "its process died, also when it was tried alone: it was killed, or there was not enough memory."
@@ -36,19 +37,37 @@ Work = Callable[[Job, str], Rows]
 def studied(job: Job, content: str) -> Rows:
     """The rows of one file; a file that cannot be used is a row that says why.
 
+    What is read of a file that changes meanwhile says nothing of it: its row is one that is not kept.
+
     Args:
         job: The file and what is told of it.
         content: Digest of what is to be read.
     """
     try:
-        measurements = read(job.path, **job.reading)
-        if digest(job.path) != content:
-            raise ReadError(f"{job.path} changed while it waited. Give the same command again.")
-        return rows.rows(study(measurements, **{"short": True, **job.studying}))
+        return rows.rows(study(_read(job, content), **{"short": True, **job.studying}))
+    except _ChangedError:
+        words = f"{job.path} changed while it waited. Give the same command again."
+        return [{"outcome": rows.FAILED, "message": words}]
     except FitmatError as error:
         return rows.refused(error)
     except Exception as error:  # one file is not worth the others
         return rows.failed(error)
+
+
+class _ChangedError(Exception):
+    """A file is not what it was, or not there."""
+
+
+def _read(job: Job, content: str) -> Measurements:
+    try:
+        return read(job.path, **job.reading)
+    finally:
+        try:
+            same = digest(job.path) == content
+        except ReadError:
+            same = False
+        if not same:
+            raise _ChangedError
 
 
 def each(jobs: Mapping[str, tuple[Job, str]], count: int, work: Work = studied) -> Iterator[tuple[str, Rows]]:

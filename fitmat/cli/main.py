@@ -12,7 +12,7 @@ import sys
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from fitmat.cli import interrupts
-from fitmat.errors import FitmatError
+from fitmat.errors import FitmatError, exhausted
 
 
 def main() -> None:
@@ -44,7 +44,7 @@ def main() -> None:
     except FitmatError as error:
         process.end(str(error))
     except (MemoryError, RuntimeError) as error:
-        words = process.exhausted(error)
+        words = exhausted(error)
         if not words:
             raise
         process.end(words)

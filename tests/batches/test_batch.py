@@ -15,9 +15,11 @@ import fitmat as fm
 from fitmat import files
 from fitmat.batches import workers
 from fitmat.batches.jobs import Job, digest, every_file, from_table
-from fitmat.batches.rows import SWATCH
+from fitmat.batches.rows import CARDS, SWATCH
 from fitmat.batches.workers import studied
 from fitmat.errors import FitmatError
+from fitmat.studies import record
+from fitmat.studies.cards import cards
 
 DATA = Path(__file__).parents[2] / "data" / "synthetic"
 
@@ -63,11 +65,13 @@ def test_rows_are_those_of_single_studies(scans: Path, tmp_path: Path) -> None:
     for name in ("sparse.csv", "wax.csv"):
         alone = fm.study(DATA / name, sampling=False)
         assert alone.match is not None
+        said = {name: card.sentence for name, card in zip(CARDS, cards(record.to_dict(alone)), strict=True)}
         for one in alone.findings:
             row = table.filter(pl.col("file").str.ends_with(f"/{name}"), pl.col("model") == one.name).row(0, named=True)
             assert row["outcome"] == one.fit.result
             assert row["best"] == (alone.choice is not None and alone.choice.candidates[0].name == one.name)
             assert row["material"].startswith("Like ")
+            assert {name: row[name] for name in CARDS} == said
             assert row["match_distance"] == pytest.approx(alone.match.hemisphere_distance.value, rel=SAME)
             for q in one.parameters:
                 assert row[q.name] == pytest.approx(q.value[0], rel=SAME)
@@ -115,14 +119,79 @@ def test_what_is_done_is_not_done_again(scans: Path, tmp_path: Path, monkeypatch
     assert len(asked) == 4
 
 
-def test_a_file_that_changes_while_it_waits_is_said(tmp_path: Path) -> None:
-    path = tmp_path / "wax.csv"
-    shutil.copy(DATA / "wax.csv", path)
-    (row,) = studied(Job(path, {}, TOLD), "another")
-    assert (row["outcome"], row["message"]) == (
-        "refused",
-        f"{path} changed while it waited. Give the same command again.",
-    )
+@pytest.mark.parametrize("text", [None, "", "theta_i,theta_o,brdf\n10,20,0.1\n"])
+def test_a_file_that_changes_while_it_waits_is_done_again(
+    text: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Removed, half copied, another: what is read of it is not kept for the file that it was."""
+    path, whole = tmp_path / "wax.csv", (DATA / "wax.csv").read_text(encoding="utf-8")
+    path.write_text(whole, encoding="utf-8")
+
+    def meanwhile(jobs: Any, count: int) -> Any:
+        path.unlink() if text is None else path.write_text(text, encoding="utf-8")
+        yield from one_by_one(jobs, count)
+
+    monkeypatch.setattr(workers, "each", meanwhile)
+    found = fm.batch(path, tmp_path / "out", "lambert")
+    assert found.counts["refused"] == 1
+    assert str(found).split("\n")[1] == f"{path} changed while it waited. Give the same command again."
+    path.write_text(whole, encoding="utf-8")
+    monkeypatch.setattr(workers, "each", lambda jobs, count: ((key, [FITTED]) for key in jobs))
+    assert fm.batch(path, tmp_path / "out", "lambert").counts == {"fitted": 1, "refused": 0, "earlier": 0}
+
+
+FITTED: dict[str, Any] = {"outcome": "converged", "message": "", "model": "lambert", "best": True}
+
+
+def test_names_that_differ_only_in_case_are_two_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parts are named so that a disk which tells no capitals apart keeps both."""
+    for name in ("wax.csv", "Wax.csv", "WAX.csv"):
+        (tmp_path / name).write_text("the same", encoding="utf-8")
+    if len(list(tmp_path.iterdir())) < 3:
+        pytest.skip("this disk tells no capitals apart")
+    monkeypatch.setattr(workers, "each", lambda jobs, count: ((k, [FITTED | {"doubts": k}]) for k in jobs))
+    found = fm.batch(tmp_path / "*.csv", tmp_path / "out", "lambert")
+    assert [Path(file).name for file in found.table["file"]] == ["WAX.csv", "Wax.csv", "wax.csv"]
+    assert found.table["doubts"].n_unique() == 3
+    assert len({path.name.lower() for path in (tmp_path / "out" / "parts").iterdir()}) == 3
+    assert fm.batch(tmp_path / "*.csv", tmp_path / "out", "lambert").table.equals(found.table)
+
+
+def test_a_full_disk_is_said_and_what_was_kept_serves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second part finds no room, as by a limit of the size of files; later there is some."""
+    resource = pytest.importorskip("resource", reason="no limits on this system")
+    for name in ("a", "b", "c"):
+        (tmp_path / f"{name}.csv").write_text(name, encoding="utf-8")
+    asked: list[str] = []
+
+    def growing(jobs: Any, count: int) -> Any:
+        del count
+        for key, (job, _) in list(jobs.items()):
+            asked.append(job.path.stem)
+            yield key, [FITTED | {"doubts": "x" * (100_000 if job.path.stem == "b" else 1)}]
+
+    monkeypatch.setattr(workers, "each", growing)
+    out, limits = tmp_path / "out", resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, limits[1]))
+    try:
+        with pytest.raises(FitmatError, match=r"\.json: cannot be written \(File too large\); choose another place\.$"):
+            fm.batch(tmp_path / "*.csv", out, "lambert")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert [path.suffix for path in (out / "parts").iterdir()] == [".json"]
+    assert os.listdir(out) == ["parts"]
+    found = fm.batch(tmp_path / "*.csv", out, "lambert")
+    assert found.counts == {"fitted": 3, "refused": 0, "earlier": 1}
+    assert asked == ["a", "b", "b", "c"]
+
+
+def test_too_little_memory_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    def greedy(*_: Any, **__: Any) -> Any:
+        raise MemoryError
+
+    monkeypatch.setattr(workers, "study", greedy)
+    (row,) = studied(Job(DATA / "wax.csv", {}, TOLD), digest(DATA / "wax.csv"))
+    assert (row["outcome"], row["message"].partition(";")[0]) == ("failed", "there is not enough memory")
 
 
 @pytest.mark.usefixtures("here")

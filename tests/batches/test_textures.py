@@ -67,7 +67,10 @@ def test_an_atlas_is_fitted_as_its_arrays_are(atlas: Path, tmp_path: Path) -> No
     assert "11 converged, 1 too_few" in str(found)
 
 
-def test_tiles_are_kept_and_used_again(atlas: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("end", [KeyboardInterrupt, MemoryError])
+def test_tiles_are_kept_and_used_again(
+    end: type[BaseException], atlas: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(textures, "TILE", 5)
     out = tmp_path / "out"
     calls: list[int] = []
@@ -75,11 +78,11 @@ def test_tiles_are_kept_and_used_again(atlas: Path, tmp_path: Path, monkeypatch:
     def stopping(*given: Any, **told: Any) -> fm.Fits:
         calls.append(len(given[2]))
         if len(calls) == 2:
-            raise KeyboardInterrupt
+            raise end
         return fm.fit_many(*given, **told)
 
     monkeypatch.setattr(textures, "fit_many", stopping)
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(end):
         fit_texture(atlas, out, **TOLD)
     kept = list((out / "parts").iterdir())
     assert len(kept) == 1
