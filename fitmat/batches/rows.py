@@ -47,7 +47,7 @@ def rows(study: Study) -> list[dict[str, Any]]:
 
 def _cards(study: Study) -> dict[str, Any]:
     """The three sentences that a page begins with, their levels, and the sphere beside them."""
-    told = record.to_dict(study)
+    told = record.to_dict(study, short=True)
     found = {}
     for name, card in zip(CARDS, cards(told), strict=True):
         found |= {name: card.sentence, f"{name}_level": card.level}

@@ -19,12 +19,13 @@ def estimate(e: Estimate | None) -> dict[str, Any] | None:
     return None if e is None else {"value": e.value, "ci95": list(e.ci95) if e.has_interval else None}
 
 
-def to_dict(match: Match, budget: dict[str, Any] | None) -> dict[str, Any]:
+def to_dict(match: Match, budget: dict[str, Any] | None, *, short: bool = False) -> dict[str, Any]:
     """What the report holds of a match.
 
     Args:
         match: What was found.
         budget: Of its distance, where there is one.
+        short: As `record.to_dict` has it.
     """
     return {
         "empirical": match.empirical.fit.name,
@@ -72,7 +73,7 @@ def to_dict(match: Match, budget: dict[str, Any] | None) -> dict[str, Any]:
             }
             for i in match.imitations
         ],
-        "perceived": None if match.perceived is None else _perceived_dict(match.perceived),
+        "perceived": None if match.perceived is None else _perceived_dict(match.perceived, short),
         "verdict": match.verdict,
     }
 
@@ -103,11 +104,13 @@ def _telling_dict(found: Telling) -> list[dict[str, Any]]:
     ]
 
 
-def _perceived_dict(seen: Perceived) -> dict[str, Any]:
+def _perceived_dict(seen: Perceived, short: bool) -> dict[str, Any]:
     def difference(found: Spread) -> dict[str, Any]:
         parts = {"mean": found.mean, "worst_twentieth": found.worst_twentieth, "largest": found.largest}
         return {name: {"value": e.value, "ci95": list(e.ci95)} for name, e in parts.items()} | {"rule": found.rule}
 
+    if short:
+        return {"delta_e_2000": difference(seen.delta_e_2000)}
     return {
         "words": seen.words,
         "colours": seen.colours,

@@ -25,12 +25,14 @@ from fitmat.studies.study import Study
 from fitmat.text import plain
 
 
-def to_dict(study: Study, command: str | None = None) -> dict[str, Any]:
+def to_dict(study: Study, command: str | None = None, *, short: bool = False) -> dict[str, Any]:
     """What the report holds, as JSON types; numbers that are not finite become null.
 
     Args:
         study: What was found.
         command: By which it was asked for; None where it was not by one.
+        short: Leave out what takes time and no card reads: of the choice all but the order, with the laws that models
+            break; of what an eye sees all but ΔE2000 in all lights.
     """
     m, first = study.measurements, study.findings[0].fit
     return plain(
@@ -50,8 +52,8 @@ def to_dict(study: Study, command: str | None = None) -> dict[str, Any]:
             "full": study.full,
             "command": command,
             "fits": [fit_dict(found) for found in study.findings],
-            "choice": None if study.choice is None else _choice_dict(study.choice),
-            "match": None if study.match is None else match_record.to_dict(study.match, _line(study)),
+            "choice": None if study.choice is None else _choice_dict(study.choice, short),
+            "match": None if study.match is None else match_record.to_dict(study.match, _line(study), short=short),
             "next": None if study.advice is None else dataclasses.asdict(study.advice),
         }
     )
@@ -156,7 +158,9 @@ def _check_dict(found: PredictiveCheck) -> dict[str, Any]:
     return {"failed": bool(found.failed), "words": found.words, "statistics": every}
 
 
-def _choice_dict(choice: Choice) -> dict[str, Any]:
+def _choice_dict(choice: Choice, short: bool) -> dict[str, Any]:
+    if short:
+        return {"candidates": [{"model": c.name} for c in choice.candidates]}
     candidates = [
         {
             "model": c.name,

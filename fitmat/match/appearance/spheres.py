@@ -9,6 +9,8 @@ the same camera.
 
 import bisect
 import dataclasses
+import functools
+from collections.abc import Callable
 
 import numpy as np
 from jaxtyping import Float
@@ -44,6 +46,9 @@ SEES = ("see no difference", "hardly see a difference", "clearly see a differenc
 SIZE = 72
 """Pictures are so many pixels wide."""
 
+Part = tuple[Float[np.ndarray, "... k"], Float[np.ndarray, "... k"], Float[np.ndarray, " m"]]
+"""XYZ of both spheres, or the luminances of greys, and the share of each place in the lit area."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Lighting:
@@ -52,18 +57,36 @@ class Lighting:
     Attributes:
         name: Of the light.
         exposure: Factor from radiance (irradiance 1 on a surface that faces the light; sky zenith 1) to display.
-        delta_e_2000: CIEDE2000 of what an sRGB display shows, which clips what is brighter than white.
-        delta_e_itp: ΔE_ITP with white at `differences.WHITE_LUMINANCE`, highlights up to 10,000 cd/m².
+        parts: What is seen: of d draws at the pixels, and of the best fits at parts of pixels, twice; see `Seen`.
         pictures: Of the best fits; None where they were not asked for.
     """
 
     name: str
     exposure: float
-    delta_e_2000: Spread
-    delta_e_itp: Spread
+    parts: tuple[Part, Part, Part]
     pictures: "Pictures | None"
 
     __repr__ = brief
+
+    @functools.cached_property
+    def seen_2000(self) -> Seen:
+        """CIEDE2000 at the pixels."""
+        return _seen(self.parts, _shown_apart)
+
+    @functools.cached_property
+    def seen_itp(self) -> Seen:
+        """ΔE_ITP at the pixels."""
+        return _seen(self.parts, _apart)
+
+    @functools.cached_property
+    def delta_e_2000(self) -> Spread:
+        """CIEDE2000 of what an sRGB display shows, which clips what is brighter than white."""
+        return spread([self.seen_2000])
+
+    @functools.cached_property
+    def delta_e_itp(self) -> Spread:
+        """ΔE_ITP with white at `differences.WHITE_LUMINANCE`, highlights up to 10,000 cd/m²."""
+        return spread([self.seen_itp])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -90,18 +113,24 @@ class Perceived:
     Attributes:
         names: Of the empirical and of the microfacet model.
         lightings: Light by light.
-        delta_e_2000: Of all lightings together, each with the same share.
-        delta_e_itp: The same.
         colours: In words, what the channels were taken for.
     """
 
     names: tuple[str, str]
     lightings: tuple[Lighting, ...]
-    delta_e_2000: Spread
-    delta_e_itp: Spread
     colours: str
 
     __repr__ = brief
+
+    @functools.cached_property
+    def delta_e_2000(self) -> Spread:
+        """Of all lightings together, each with the same share."""
+        return spread([lighting.seen_2000 for lighting in self.lightings])
+
+    @functools.cached_property
+    def delta_e_itp(self) -> Spread:
+        """The same."""
+        return spread([lighting.seen_itp for lighting in self.lightings])
 
     @property
     def words(self) -> str:
@@ -153,12 +182,9 @@ def perceived(
     screens, computed = _rendered(pair, colours.weights[:, 1:2] if colours.grey else colours.weights)
     names = [*scene.LIGHTS, scene.ENVIRONMENT]
     each = zip(names, screens, computed, strict=True)
-    lightings, seen = zip(*(_lighting(name, screen, xyz, pictures) for name, screen, xyz in each), strict=True)
     return Perceived(
         names=(pair[0][0].name, pair[1][0].name),
-        lightings=lightings,
-        delta_e_2000=spread([each[0] for each in seen]),
-        delta_e_itp=spread([each[1] for each in seen]),
+        lightings=tuple(_lighting(name, screen, xyz, pictures) for name, screen, xyz in each),
         colours=colours.words,
     )
 
@@ -196,36 +222,39 @@ def _coloured(f: Float[np.ndarray, "d m c"], weights: Float[np.ndarray, "c k"]) 
     return np.broadcast_to(f, (*f.shape[:2], len(weights))) @ weights
 
 
-def _lighting(
-    name: str, screen: Screen, xyz: Float[np.ndarray, "d 2 m k"], pictures: bool
-) -> tuple[Lighting, tuple[Seen, Seen]]:
-    """The lighting, and ΔE2000 and ΔE_ITP there."""
+def _lighting(name: str, screen: Screen, xyz: Float[np.ndarray, "d 2 m k"], pictures: bool) -> Lighting:
     share = np.asarray(screen.area / screen.area.sum()).ravel()
     size = xyz.shape[-1]
     exposure = float(MIDDLE_GREY / max(share @ xyz[0, 1, :, size // 2], 1e-300))
     one, other = np.moveaxis(exposure * xyz, 1, 0)
     both = np.concatenate([one[0], other[0]], axis=1)
     fine, half = finer.divided(screen, both), finer.divided(*finer.halved(screen, both))
-    each = [_differences(one, other), *(_differences(v[:, :size], v[:, size:]) for v, _ in (fine, half))]
-    shares = [area / area.sum() for _, area in (fine, half)]
-    seen = Seen(each[0][0], share, (each[1][0], shares[0]), (each[2][0], shares[1]))
-    itp = Seen(each[0][1], share, (each[1][1], shares[0]), (each[2][1], shares[1]))
-    lighting = Lighting(
+    finer_parts = [(v[:, :size], v[:, size:], area / area.sum()) for v, area in (fine, half)]
+    return Lighting(
         name=name,
         exposure=exposure,
-        delta_e_2000=spread([seen]),
-        delta_e_itp=spread([itp]),
+        parts=((one, other, share), finer_parts[0], finer_parts[1]),
         pictures=_both(screen, one[0], other[0]) if pictures else None,
     )
-    return lighting, (seen, itp)
 
 
-def _differences(one: Float[np.ndarray, "... k"], other: Float[np.ndarray, "... k"]) -> tuple[np.ndarray, np.ndarray]:
-    """ΔE2000 of what a display shows, and ΔE_ITP, of XYZ or of the luminances of greys."""
+def _seen(parts: tuple[Part, Part, Part], apart: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Seen:
+    (delta, share), fine, half = ((apart(one, other), share) for one, other, share in parts)
+    return Seen(delta, share, fine, half)
+
+
+def _shown_apart(one: Float[np.ndarray, "... k"], other: Float[np.ndarray, "... k"]) -> Float[np.ndarray, "..."]:
+    """ΔE2000 of what a display shows, of XYZ or of the luminances of greys."""
     if one.shape[-1] == 1:
-        one, other = one[..., 0], other[..., 0]
-        return greys_2000(np.clip(one, 0.0, 1.0), np.clip(other, 0.0, 1.0)), greys_itp(one, other)
-    return delta_e_2000(shown(one), shown(other)), delta_e_itp(np.maximum(one, 0.0), np.maximum(other, 0.0))
+        return greys_2000(np.clip(one[..., 0], 0.0, 1.0), np.clip(other[..., 0], 0.0, 1.0))
+    return delta_e_2000(shown(one), shown(other))
+
+
+def _apart(one: Float[np.ndarray, "... k"], other: Float[np.ndarray, "... k"]) -> Float[np.ndarray, "..."]:
+    """ΔE_ITP of the same."""
+    if one.shape[-1] == 1:
+        return greys_itp(one[..., 0], other[..., 0])
+    return delta_e_itp(np.maximum(one, 0.0), np.maximum(other, 0.0))
 
 
 def _both(screen: Screen, one: Float[np.ndarray, "m k"], other: Float[np.ndarray, "m k"]) -> Pictures:
