@@ -147,6 +147,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             "name": (None, *TEXT, "", "lambort"),
             "masking": TEXT,
             "channels": without((0, *WHOLE), NOTHING),
+            "wavelengths": (*without(NUMBERS, NOTHING), [550.0], 0.55, np.nan, []),
             "kd": (*NUMBERS, np.zeros((2, 2)), np.nan, 1.5, -0.1),
         },
     ),

@@ -1,4 +1,4 @@
-"""Dispersed: a model whose refractive index follows a law over the wavelengths at which it was measured.
+"""Dispersed: a model at the wavelengths at which it was measured, its refractive index by a law, its films in place.
 
 It fits nothing; it turns "the index follows Cauchy's law" into a model that `fit` understands.
 """
@@ -12,12 +12,11 @@ import numpy as np
 from fitmat import arguments
 from fitmat.errors import ModelError
 from fitmat.models.base import AbstractBRDF
+from fitmat.models.dispersion import LONGEST, SHORTEST
 from fitmat.models.registry import LOBES, OVER, lobe_names
 from fitmat.models.terms.dispersive import LAWS, AbstractDispersive
+from fitmat.models.terms.film import has_film, placed
 from fitmat.models.terms.fresnel import Conductor, Dielectric
-
-SHORTEST, LONGEST = 250.0, 20_000.0
-"""Wavelengths in nm for which the laws' ranges are meant: below, glass absorbs; above, what is read is no nm."""
 
 
 def dispersed(template: AbstractBRDF, law: str, channels: tuple[str, ...]) -> AbstractBRDF:
@@ -89,23 +88,50 @@ def laws_of(model: AbstractBRDF) -> list[AbstractDispersive]:
     return [part for part in parts if isinstance(part, AbstractDispersive)]
 
 
+def located(model: AbstractBRDF, channels: tuple[str, ...]) -> AbstractBRDF:
+    """The model with its films at the wavelengths that the channels are; one without films as it is.
+
+    Raises:
+        ModelError: it has a film, and a channel is no wavelength.
+    """
+    if not has_film(model):
+        return model
+    found = _numbers(channels)
+    if (odd := _odd(channels, found)) is not None:
+        raise ModelError(
+            f"{model.name}: channel {odd!r}, expected channels that are wavelengths from {SHORTEST:g} to {LONGEST:g} "
+            "nm, as in columns brdf_450, brdf_550: what a film reflects turns on the wavelength. Name them so, or take "
+            "another Fresnel term, as ggx-conductor."
+        )
+    return placed(model, found, len(channels))
+
+
 def wavelengths(law: str, channels: tuple[str, ...]) -> np.ndarray:
     """Of each channel, nm.
 
     Raises:
         ModelError: a channel is no wavelength, or there is one channel, of which no law could be told.
     """
-    names = [name.strip().lower().removesuffix("nm").strip() for name in channels]
-    try:
-        found = np.array([float(name) for name in names])
-    except ValueError:
-        found = np.full(len(names), np.nan)
-    good = (found >= SHORTEST) & (found <= LONGEST)
-    if not good.all() or len(found) < 2:
-        odd = channels[int(np.argmin(good))]
-        got = f"channel {odd!r}" if not good.all() else f"the one channel {odd!r}"
+    found = _numbers(channels)
+    odd = _odd(channels, found)
+    if odd is not None or len(found) < 2:
+        got = f"channel {odd!r}" if odd is not None else f"the one channel {channels[0]!r}"
         raise ModelError(
             f"dispersion = {law}: {got}, expected two channels or more that are wavelengths from {SHORTEST:g} to "
             f"{LONGEST:g} nm, as in columns brdf_450, brdf_550. Leave the law out."
         )
     return found
+
+
+def _numbers(channels: tuple[str, ...]) -> np.ndarray:
+    """The channels' names as numbers; NaN of all where one is none."""
+    names = [name.strip().lower().removesuffix("nm").strip() for name in channels]
+    try:
+        return np.array([float(name) for name in names])
+    except ValueError:
+        return np.full(len(names), np.nan)
+
+
+def _odd(channels: tuple[str, ...], nm: np.ndarray) -> str | None:
+    """The first channel that is no wavelength."""
+    return next((name for name, x in zip(channels, nm, strict=True) if not SHORTEST <= x <= LONGEST), None)

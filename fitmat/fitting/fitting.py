@@ -15,7 +15,7 @@ from fitmat.errors import FitmatError, ModelError
 from fitmat.fitting.concluding import conclude
 from fitmat.fitting.coordinates import Coordinates, coordinates
 from fitmat.fitting.discrepancy import first_discrepancy
-from fitmat.fitting.dispersed import dispersed
+from fitmat.fitting.dispersed import dispersed, located
 from fitmat.fitting.ends import Ends, behind
 from fitmat.fitting.jitter import AGAIN, jittered
 from fitmat.fitting.likelihood import Data, prepare
@@ -79,7 +79,7 @@ def fit(
     arguments.named(fixed=fixed, priors=priors)
     arguments.whole("max_steps", max_steps, 1)
     measurements = measurements_of(measurements)
-    template = asked_model(to, len(measurements.channels), masking)
+    template = located(asked_model(to, len(measurements.channels), masking), measurements.channels)
     arguments.kind("dispersion", dispersion, str, optional=True)
     if dispersion is not None:
         template = dispersed(template, dispersion, measurements.channels)

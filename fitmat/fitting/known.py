@@ -13,6 +13,7 @@ from fitmat.models import spectral
 from fitmat.models.in_rgb import WAYS, fresnel_in_rgb
 from fitmat.models.parameters import entries
 from fitmat.models.registry import LOBES, OVER, lobe_names, model
+from fitmat.models.terms.film import Film
 from fitmat.models.terms.fresnel import COS_82, Dielectric
 
 OPTICAL = ("eta", "kappa", "f0", "f82")
@@ -59,11 +60,12 @@ def of_material(name: str, material: str, channels: tuple[str, ...]) -> Known:
     known = {}
     for part in renamed.values():
         own = {key for key in LOBES[part].defaults() if key in values}
-        if "kappa" in own and not metal:
+        if "kappa" in own and not metal and LOBES[part].parts["fresnel"] is not Film:
             raise ModelError(f"--ior {material} does not absorb light: use the lobe without -conductor or -belcour.")
         for key in own:
             entry = names.get(f"{part}.{key}") or names[key]
-            known[entry.name] = values[key] if entry.size == len(channels) else np.mean(values[key], keepdims=True)
+            value = np.maximum(values[key], entry.param.lower)  # the κ of glass under a film
+            known[entry.name] = value if entry.size == len(channels) else np.mean(value, keepdims=True)
     if set(channels) == set(spectral.RGB):
         _say_what_rgb_cannot_hold(material, {key.rpartition(".")[2] for key in known})
     return {name: known}

@@ -18,6 +18,9 @@ from fitmat.maths.arrays import library
 FILE = Path(__file__).with_name("refractive_indices.json")
 """Dataset → its parts: tables over µm, and formulas with the range in µm where they hold; `benchmarks/indices.py`."""
 
+SHORTEST, LONGEST = 250.0, 20_000.0
+"""Wavelengths in nm for which fitted laws are meant: below, glass absorbs; above, what is read is no nm."""
+
 Curve = Callable[[Float[np.ndarray, "..."]], Float[np.ndarray, "..."]]
 """Wavelength → n or k."""
 

@@ -88,6 +88,22 @@ def as_parameter(value: Any) -> Any:
     return found
 
 
+def of_size(name: str, given: Any, channels: int | None, per_channel: bool) -> Any:
+    """The same as one number for each channel where the parameter has as many, for a model of `channels`.
+
+    Raises:
+        ModelError: it has another number of values.
+    """
+    value = as_parameter(given)
+    if channels is not None and per_channel:
+        if value.size not in (1, channels):
+            raise ModelError(f"parameter {name} has {value.size} values: expected 1 or {channels}, one a channel.")
+        return np.broadcast_to(np.ravel(value), (channels,))
+    if channels is not None and value.size != 1:
+        raise ModelError(f"parameter {name} has {value.size} values: expected 1, it is shared by all channels.")
+    return value
+
+
 @dataclasses.dataclass(frozen=True)
 class Entry:
     """A named parameter of one model, with its place in the model's parameter vector."""

@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping
 from typing import Any, Literal, get_args
 
 import equinox as eqx
-import numpy as np
 from jaxtyping import ArrayLike
 
 from fitmat import arguments
@@ -35,15 +34,16 @@ from fitmat.models.lobes.phong import BlinnPhong, BlinnPhongExact, Phong
 from fitmat.models.lobes.turquin import Turquin
 from fitmat.models.lobes.walter import Walter
 from fitmat.models.lobes.ward import Ward, WardBounded
-from fitmat.models.parameters import Param, as_parameter, check_range
+from fitmat.models.parameters import Param, check_range, of_size
 from fitmat.models.terms.belcour import Belcour
 from fitmat.models.terms.distributions import GGX, MASKINGS, Anisotropic, Beckmann, BeckmannRational, Isotropic
+from fitmat.models.terms.film import Film, placed
 from fitmat.models.terms.fresnel import F82, Conductor, Dielectric, Schlick
 
 OVER = "-over-"
 """Between a coat, or a tilted mount, and what lies below it."""
 
-FRESNELS = (Dielectric, Schlick, F82, Conductor, Belcour)
+FRESNELS = (Dielectric, Schlick, F82, Conductor, Belcour, Film)
 """Fresnel terms that any microfacet lobe can carry, in the order of their suffixes in `fitmat models`."""
 
 LobeKind = Literal["diffuse", "empirical", "microfacet", "cover"]
@@ -229,7 +229,14 @@ def _walked(name: str, **given: Any) -> Walked:
     return Walked(lobe, Sum(tuple(rest)) if rest else None, "+".join(parts), estimator)
 
 
-def model(name: str, *, masking: str | None = None, channels: int | None = None, **values: ArrayLike) -> AbstractBRDF:
+def model(
+    name: str,
+    *,
+    masking: str | None = None,
+    channels: int | None = None,
+    wavelengths: ArrayLike | None = None,
+    **values: ArrayLike,
+) -> AbstractBRDF:
     """Build a model from its name.
 
     Args:
@@ -237,6 +244,7 @@ def model(name: str, *, masking: str | None = None, channels: int | None = None,
             may be tilted, "tilt-over-lambert+ggx"; `fitmat models` lists the lobes. One may be of `WALKS`.
         masking: "correlated", "separable" or "v-cavity" for the microfacet lobes; None keeps each lobe's own.
         channels: Give per-channel parameters this many values; None keeps what is passed.
+        wavelengths: Of each channel in nm, for lobes with a thin film, as `ggx-film`; None is 550 nm, of one channel.
         **values: Parameters by name, also as others call them (`names.READINGS`); the rest take defaults. A name that
             two lobes share means both, or one of them as `**{"ggx.ks": 0.5}`.
 
@@ -244,7 +252,7 @@ def model(name: str, *, masking: str | None = None, channels: int | None = None,
         A frozen module; call it through `fitmat.evaluate`.
 
     Raises:
-        ModelError: unknown lobe, parameter or masking, or a value out of range.
+        ModelError: unknown lobe, parameter or masking, a value out of range, or wavelengths of what has no film.
 
     Example:
         >>> import fitmat as fm
@@ -254,7 +262,7 @@ def model(name: str, *, masking: str | None = None, channels: int | None = None,
     arguments.kind("masking", masking, str, optional=True)
     arguments.whole("channels", channels, 1, optional=True)
     if any(part in WALKS for part in _split(name)[1]):
-        return _walked(name, masking=masking, channels=channels, **values)
+        return _walked(name, masking=masking, channels=channels, wavelengths=wavelengths, **values)
     covers, parts = _parsed(name)
     lobes = covers + parts
     known = {key for part in lobes for key in LOBES[part].defaults()}
@@ -272,7 +280,7 @@ def model(name: str, *, masking: str | None = None, channels: int | None = None,
     for cover in reversed(covers):
         built = _lobe(cover, masking, channels, values, base=built)
     check_range(built)
-    return built
+    return built if wavelengths is None else placed(built, wavelengths, channels)
 
 
 def _lobe(
@@ -282,20 +290,9 @@ def _lobe(
     lobe = LOBES[name]
     wanted: dict[str, Any] = {key: default for key, (_, default) in lobe.defaults().items()} | values
     wanted |= {key.removeprefix(f"{name}."): value for key, value in values.items() if key.startswith(f"{name}.")}
-    numbers = {key: _number(key, wanted[key], channels, lobe.per_channel(key)) for key in lobe.defaults()}
+    numbers = {key: of_size(key, wanted[key], channels, lobe.per_channel(key)) for key in lobe.defaults()}
     given = numbers if masking is None else numbers | {"masking": masking}
     for field, part in lobe.parts.items():
         inner[field] = part(**{f.name: given[f.name] for f in _fields(part) if f.name in given})
     own = {f.name: given[f.name] for f in _fields(lobe.shape) if f.name in given}
     return lobe.shape(**own, **inner)
-
-
-def _number(key: str, given: ArrayLike, channels: int | None, per_channel: bool) -> Any:
-    value = as_parameter(given)
-    if channels is not None and per_channel:
-        if value.size not in (1, channels):
-            raise ModelError(f"parameter {key} has {value.size} values: expected 1 or {channels}, one a channel.")
-        return np.broadcast_to(np.ravel(value), (channels,))
-    if channels is not None and value.size != 1:
-        raise ModelError(f"parameter {key} has {value.size} values: expected 1, it is shared by all channels.")
-    return value

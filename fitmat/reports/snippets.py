@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fitmat.models.registry import LOBES, lobe_names
+from fitmat.models.terms.film import Film
 
 Record = Mapping[str, Any]
 """A part of the record of a study, as JSON types."""
@@ -22,13 +23,17 @@ def snippets(fit: Record) -> list[tuple[str, str]]:
     Args:
         fit: One of the record's `fits`.
     """
-    if fit.get("dispersion") is not None:  # whose index a model by name does not have
+    if fit.get("dispersion") is not None or _has_film(fit["model"]):  # of whose wavelengths a model by name knows none
         return []
     own = {key for part in lobe_names(fit["model"]) for key in LOBES[part].defaults()}
     told = {name: q["value"] for name, q in fit["parameters"].items() if name.rpartition(".")[2] in own}
     if not told or any(v is None for value in told.values() for v in _listed(value)):
         return []
     return [("JSON", _json(fit["model"], told)), ("Python", _python(fit, told)), ("shader", _shader(told))]
+
+
+def _has_film(name: str) -> bool:
+    return any(LOBES[part].parts.get("fresnel") is Film for part in lobe_names(name))
 
 
 def _listed(value: Any) -> Sequence[Any]:

@@ -44,6 +44,7 @@ TERMS: Mapping[str, tuple[str, ...]] = {
     "-schlick": ("schlick1994",),
     "-f82": ("hoffman2019",),
     "-belcour": ("belcour2020",),
+    "-film": ("born1999",),
 }
 """Part of a lobe's name after its beginning → the same."""
 

@@ -11,7 +11,7 @@ import numpy as np
 from fitmat import arguments
 from fitmat.errors import ModelError
 from fitmat.fitting import known
-from fitmat.fitting.dispersed import carrying, dispersed
+from fitmat.fitting.dispersed import carrying, dispersed, located
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.losses import loss as find_loss
 from fitmat.fitting.priors import DISCREPANCY, refuse_idle
@@ -101,7 +101,9 @@ def plan(
         names = _with_law(names, dispersion, ior)
     prepared = known.prepare_known(names, measurements, ior=ior, tilt=tilt)
     lawful = [name for name in prepared if dispersion is not None and carrying(name, dispersion)]
-    having = {name: {e.name for e in entries(model(name))} | _BESIDE for name in prepared}
+    having = {
+        name: {e.name for e in entries(located(model(name), measurements.channels))} | _BESIDE for name in prepared
+    }
     for name in lawful:
         built = dispersed(model(name), dispersion or "", measurements.channels)
         having[name] = {e.name for e in entries(built)} | _BESIDE

@@ -19,7 +19,7 @@ from jaxtyping import Float
 from fitmat import arguments
 from fitmat.errors import ModelError, ReadError
 from fitmat.fitting.coordinates import channel_names
-from fitmat.fitting.dispersed import dispersed
+from fitmat.fitting.dispersed import dispersed, located
 from fitmat.fitting.quantities import Quantity, dataframe, named
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import entries, vector, with_vector
@@ -246,7 +246,7 @@ def _fits(record: Mapping[str, Any], folder: Path) -> Iterator[Fitted]:
         values = {key: q["value"] for key, q in told.items() if key.rpartition(".")[2] in known}
         if any(one is None for value in values.values() for one in np.ravel(np.array(value, object))):
             continue
-        model = built(name, masking=fit["masking"], **values)
+        model = located(built(name, masking=fit["masking"], **values), channels)
         if (law := fit.get("dispersion")) is not None:
             model = dispersed(model, law, channels)
             numbers = [np.ravel(told[e.name]["value"]) for e in entries(model) if e.name in told]

@@ -39,7 +39,8 @@ COVERED = (
 )
 """Models under a face, which take a program each."""
 
-NAMES = [*(name for name in LOBES if LOBES[name].kind != "cover" and name != "plastic"), *COVERED]
+FILMS = [name for name in LOBES if name.endswith("-film")]
+NAMES = [*(n for n in LOBES if LOBES[n].kind != "cover" and n != "plastic" and n not in FILMS), *COVERED]
 FEW = ("oren-nayar-full", "phong", "ward-aniso", "ashikhmin-shirley", "beckmann-kc-belcour", "disney-2015")
 """What every run executes; the study executes all."""
 

@@ -117,8 +117,11 @@ def deviation(found: Fit, name: str, values: dict[str, Any]) -> float:
 
 
 def test_no_lobe_is_left_out() -> None:
-    """But for combinations of roughness or compensation with a Fresnel term other than the first."""
-    parts = ("-aniso", "-kc", "-turquin")
+    """But for combinations of roughness or compensation with a Fresnel term other than the first.
+
+    Films, which need wavelengths, are found in `test_film.py`.
+    """
+    parts = ("-aniso", "-kc", "-turquin", "-film")
     combined = [n for n, lobe in LOBES.items() if lobe.fresnel_suffix(n) and any(part in n for part in parts)]
     assert set(LOBES) - set(CASES) <= set(combined)
 
