@@ -33,8 +33,8 @@ WORDS: dict[str, Callable[[float, float, float], bool]] = {
     "violet": lambda light, chroma, hue: chroma > 25 and 308 <= hue < 330,
     "pink": lambda light, chroma, hue: light > 55 and chroma > 25 and (hue >= 330 or hue < 25),
 }
-"""Lightness, chroma and hue of CIELAB that a word may mean, sectors chosen here: red is near 25° there, yellow near 90°,
-green near 160°, blue near 270°."""
+"""Lightness, chroma and hue of CIELAB that a word may mean, sectors chosen here: red is near 25° there, yellow near
+90°, green near 160°, blue near 270°."""
 
 NM = np.arange(0.0, 271.0)
 
