@@ -7,27 +7,31 @@ of the base. All sizes are found by restricted maximum likelihood, which allows 
 (Patterson & Thompson, Biometrika 58, 1971), each channel by itself. Where there is a process, the covariance V of the
 parameters is that of the jackknife which leaves out ranges of the difference angle θ_d, and of the incidence, in turn
 (`left_blocks`), the sum of the two, as misfits run along both (Cameron, Gelbach & Miller, J. Bus. Econ. Stat. 29
-(2011), 238): how much a range more or less would move them is seen, not modelled. It is never narrower than H⁻¹ in
-any direction. Channels without a process add what their likelihood says. Draws θ become θ̂ + A(θ − θ̂) with A H⁻¹ Aᵀ
-= V (Shaby, "The open-faced sandwich adjustment for MCMC using estimating functions", J. Comp. Graph. Stat. 23, 2014),
-so that whatever follows from draws follows from these. The best fit stays.
+(2011), 238): how much a range more or less would move them is seen, not modelled; to first order, and where such a
+step would leave the bounds by a fit. It is never narrower than H⁻¹ in any direction. Channels without a process add
+what their likelihood says. Draws θ become θ̂ + A(θ − θ̂) with A H⁻¹ Aᵀ = V (Shaby, "The open-faced sandwich adjustment
+for MCMC using estimating functions", J. Comp. Graph. Stat. 23, 2014), so that whatever follows from draws follows from
+these. The best fit stays.
 
 K is Matérn's of smoothness 3/2 over where the half vector lies about the normal, at distance asinh(θ_h/w) with the
 lobe's width w (an even scale up to one width, ratios beyond) and at its azimuth from the plane of incidence, and over
-the difference angle θ_d. Its lengths are fixed: free ones follow chance. It knows no solver, no sampler and no prior.
+the difference angle θ_d. Its lengths are fixed: free ones follow chance. It knows no sampler and no prior.
 """
 
 import dataclasses
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from fitmat.fitting.coordinates import Coordinates
-from fitmat.fitting.left_blocks import left_out, of_few, ranges
+from fitmat.fitting.ends import behind
+from fitmat.fitting.left_blocks import Again, left_out, of_few, ranges
 from fitmat.fitting.likelihood import Data
 from fitmat.fitting.linear import Linear
 from fitmat.fitting.process import ASKED, Found, counted, find, independent, kernel
+from fitmat.fitting.refining import optima
 from fitmat.maths.blas import one_thread
 from fitmat.maths.directions import zenith
 from fitmat.models.base import AbstractBRDF
@@ -116,14 +120,15 @@ def correlate(
     if linear is None or not np.isfinite(np.where(linear.used, linear.r, 0.0)).all() or not linear.r[linear.used].any():
         return none
     inside, h = linear.inside, linear.factor
-    first, r, slopes, used = _apart(linear)
+    first, group, r, slopes, used = _apart(linear)
     places, near = (part[first] for part in _places(best, linear.data))
-    some = np.any(used, axis=1)
-    parts = kernel(places, np.stack([some & near, some & ~near]))
+    parts = kernel(places, np.stack([near, ~near]))
     found, counts = find(r, slopes, used, parts), counted(used, parts)
     asked = found.gain >= ASKED
     along = places[:, 2], np.round(np.asarray(zenith(np.asarray(linear.data.wi)[first])), 6)
-    ratio, axes = np.linalg.eigh(h.T @ _spread(found, r, slopes, along, linear) @ h)
+    again = partial(_again, best, linear, moved, asked)
+    each = [(blocks, again(blocks[group])) for blocks in map(ranges, along) if blocks.any()]
+    ratio, axes = np.linalg.eigh(h.T @ _spread(found, r, slopes, each, linear) @ h)
     least = 1.0 + 2.0 * rho / (1.0 - rho) / (1.0 + s / float(data.typical)) ** 2
     if least == 1.0 and (not asked.any() or ratio[-1] <= 1.0):
         judged = np.isfinite(found.gain).any()
@@ -132,7 +137,7 @@ def correlate(
     wide = np.linalg.solve(h.T, axes * np.sqrt(np.maximum(ratio, least)))
     stretch[np.ix_(inside, inside)] = wide @ axes.T @ h.T
     inflation[inside] = np.sum(wide**2, axis=1) / np.sum(np.linalg.inv(h) ** 2, axis=0)
-    share, alone = float(np.mean(near[some])), min(independent(found, counts, linear.more), count / least)
+    share, alone = float(np.mean(near)), min(independent(found, counts, linear.more), count / least)
     return Correlation(found.size, share, found.gain, stretch, inflation, alone, "correlated", least)
 
 
@@ -140,7 +145,7 @@ def _spread(
     found: Found,
     r: Float[np.ndarray, "n c"],
     slopes: Float[np.ndarray, "n c i"],
-    along: Sequence[Float[np.ndarray, " n"]],
+    each: Sequence[tuple[Int[np.ndarray, " n"], Again]],
     linear: Linear,
 ) -> Float[np.ndarray, "i i"]:
     """V: the jackknife along each of some angles, of the channels with a process, and the likelihood's of the others.
@@ -148,14 +153,39 @@ def _spread(
     Of a part of the rows the noise of each stands for that of `more`, too much by as many times less one.
     """
     asked, inverse = found.gain >= ASKED, np.linalg.inv(linear.known)
-    each = [blocks for blocks in map(ranges, along) if blocks.any()]
     moved = np.zeros_like(inverse)
-    for blocks in each:
-        moved += left_out(r * asked, slopes * asked[:, None], linear.known, blocks, linear.more)
-    moved *= of_few(max(sum(int(blocks.max()) for blocks in each), 1))
+    if asked.any():
+        for blocks, again in each:
+            moved += left_out(r * asked, slopes * asked[:, None], linear.known, blocks, linear.more, again)
+    moved *= of_few(max(sum(int(blocks.max()) for blocks, _ in each), 1))
     weight = np.where(asked, -(linear.more - 1.0) * found.white, 1.0)
     rest = linear.more * np.einsum("nci,c,ncj->ij", slopes, weight, slopes, optimize=True)
     return moved + inverse @ rest @ inverse
+
+
+def _again(
+    best: AbstractBRDF, linear: Linear, moved: Coordinates, asked: Bool[np.ndarray, " c"], rows: Int[np.ndarray, " n"]
+) -> Again:
+    """Fits without the blocks of the data's rows, in the channels with a process.
+
+    They begin at the best values, and where the straight step meets the first bound.
+    """
+    values, inside = np.asarray(vector(best)), linear.inside
+    here = moved.natural(values)
+    low, high = ((end - here)[inside] for end in moved.around(here))
+
+    def moves(block: int, step: Float[np.ndarray, " i"]) -> Float[np.ndarray, " i"]:
+        gone = (rows == block)[:, None] & asked
+        data = dataclasses.replace(linear.data, weight=np.where(gone, 0.0, linear.data.weight))
+        begin, most = np.tile(here, (2, 1)), 1.0 / np.max(step / np.where(step < 0.0, low, high))
+        begin[1, inside] += most * step
+        ends = optima(best, data, moved.filled(values, begin), moved)
+        apart = behind(ends, data)
+        if not np.isfinite(apart).any():
+            return most * step
+        return (moved.natural(moved.near(ends.values[np.argmin(apart)], values)) - here)[inside]
+
+    return Again(low, high, moves)
 
 
 def _unchanged(data: Data, parameters: int, count: int) -> Correlation:
@@ -164,21 +194,24 @@ def _unchanged(data: Data, parameters: int, count: int) -> Correlation:
     return Correlation(*parts, float(count), "not judged")
 
 
-def _apart(linear: Linear) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """First rows of distinct directions; their residuals, slopes and which are in use, repeats added up over √m.
+def _apart(linear: Linear) -> tuple[np.ndarray, ...]:
+    """First rows of distinct directions, and at which of these each row lies; their residuals, slopes and use.
 
+    Those of repeats are added up over √m.
     Errors that repeats have in common are no misfit that neighbours share.
     """
-    pairs = np.round(np.concatenate([linear.data.wi, linear.data.wo], axis=1), 9)
-    _, first, group = np.unique(pairs, axis=0, return_index=True, return_inverse=True)
-    if len(first) == len(pairs):
-        return np.arange(len(pairs)), linear.r, linear.slopes, linear.used
-    found = [np.zeros((len(first), *part.shape[1:])) for part in (linear.r, linear.slopes, linear.used)]
-    for sums, part in zip(found, (np.where(linear.used, linear.r, 0.0), linear.slopes, linear.used), strict=True):
-        np.add.at(sums, group.ravel(), part)
+    some = np.any(linear.used, axis=1)
+    pairs = np.round(np.concatenate([linear.data.wi, linear.data.wo], axis=1)[some], 9)
+    _, first, of = np.unique(pairs, axis=0, return_index=True, return_inverse=True)
+    group = np.full(len(some), -1)
+    group[some] = of.ravel()
+    parts = [part[some] for part in (np.where(linear.used, linear.r, 0.0), linear.slopes, linear.used)]
+    found = [np.zeros((len(first), *part.shape[1:])) for part in parts]
+    for sums, part in zip(found, parts, strict=True):
+        np.add.at(sums, of.ravel(), part)
     r, slopes, count = found
     root = np.sqrt(np.maximum(count, 1.0))
-    return first, r / root, slopes / root[..., None], count > 0
+    return np.flatnonzero(some)[first], group, r / root, slopes / root[..., None], count > 0
 
 
 def _places(best: AbstractBRDF, data: Data) -> tuple[Float[np.ndarray, "n 3"], Bool[np.ndarray, " n"]]:

@@ -7,14 +7,16 @@ from collections.abc import Callable
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import Array, ArrayLike, Bool, Float
 
 from fitmat.fitting.channelwise import layout
 from fitmat.fitting.coordinates import Coordinates, coordinates
-from fitmat.fitting.likelihood import Data, every_residual, misfits
+from fitmat.fitting.likelihood import Data, Prior, every_residual, misfits
+from fitmat.fitting.priors import natural_sd
 from fitmat.maths.grams import Layout
 from fitmat.maths.least_squares import normal_equations
 from fitmat.maths.mapping import mapped
+from fitmat.maths.normal import Z95
 from fitmat.maths.programs import program
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import entries, vector
@@ -22,6 +24,10 @@ from fitmat.models.values import at, slices
 
 UNDETERMINED = {"log": 1.0, "linear": 0.3}
 """A parameter whose standard deviation exceeds this (in ln p, or as a fraction of its range) is not determined."""
+
+CONTRACTED = 0.5
+"""Contraction 1 − var_post/var_prior below which a parameter is not determined: its standard deviation is more than
+0.7 of what it was before any datum."""
 
 FOLLOWS, MISSES = 0.5, 2.0
 """Ratios of discrepancy to noise up to which a model follows the data, and from which it is inadequate."""
@@ -189,6 +195,23 @@ def _squared(size: np.ndarray) -> np.ndarray:
 def limits(moved: Coordinates) -> Float[np.ndarray, " k"]:
     """Standard deviations, natural, beyond which a parameter is not determined: `UNDETERMINED`."""
     return np.where(moved.ratio, UNDETERMINED["log"], UNDETERMINED["linear"] * moved.extent)
+
+
+def widest(model: AbstractBRDF, prior: Prior | None) -> Float[np.ndarray, " p"]:
+    """Of all parameters: `limits`, or what `CONTRACTED` asks where that is less."""
+    return np.minimum(limits(coordinates(model)), np.sqrt(1.0 - CONTRACTED) * natural_sd(model, prior))
+
+
+def spreads(model: AbstractBRDF, ci95: Float[np.ndarray, "p 2"]) -> Float[np.ndarray, " p"]:
+    """Standard deviations, natural, of Gaussians with these 95 % intervals, physical; NaN where there is none."""
+    low, high = coordinates(model).natural(ci95.T)
+    return (high - low) / (2.0 * Z95)
+
+
+def wide(model: AbstractBRDF, prior: Prior | None, ci95: Float[np.ndarray, "p 2"]) -> Bool[np.ndarray, " p"]:
+    """Which intervals are beyond `widest`, but for parameters of which a prior tells."""
+    told = False if prior is None else np.asarray(prior.precision) > 0
+    return (spreads(model, ci95) > widest(model, prior)) & ~np.asarray(told)
 
 
 def covariance(

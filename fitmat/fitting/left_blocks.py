@@ -1,7 +1,10 @@
 """Left blocks: how far a fit moves when a range of geometries is left out, and the covariance that follows.
 
-It solves to first order, and knows no model.
+It solves to first order, and knows no model: who calls fits again where such a step leaves the bounds.
 """
+
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -19,6 +22,20 @@ LEAST = 1e-6
 """Of a parameter's own information that is always left, so that one that a single range determines moves finitely."""
 
 
+class Again(NamedTuple):
+    """How far steps may go, and what holds beyond.
+
+    Attributes:
+        low: How far the lower bounds are, (i,).
+        high: How far the upper bounds are.
+        moves: Block and its step → how far a fit moves without it, (i,).
+    """
+
+    low: Float[np.ndarray, " i"]
+    high: Float[np.ndarray, " i"]
+    moves: Callable[[int, Float[np.ndarray, " i"]], Float[np.ndarray, " i"]]
+
+
 def ranges(places: Float[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
     """Which of `BLOCKS` ranges of as many readings each a reading lies in, from 0; equal places lie in the same."""
     ends = np.quantile(places, np.linspace(0.0, 1.0, BLOCKS + 1)[1:-1])
@@ -31,12 +48,14 @@ def left_out(
     known: Float[np.ndarray, "i i"],
     blocks: Int[np.ndarray, " n"],
     more: float,
+    again: Again,
 ) -> Float[np.ndarray, "i i"]:
-    """(g − 1)/g Σ (δ_k − δ̄)(δ_k − δ̄)ᵀ over g blocks, δ_k = (H − H_k)⁻¹ s_k: the jackknife that leaves out a block.
+    """(g − 1)/g Σ (δ_k − δ̄)(δ_k − δ̄)ᵀ over g blocks, δ_k = −(H − H_k)⁻¹ s_k: the jackknife that leaves out a block.
 
     Tukey, Ann. Math. Stat. 29 (1958), 614; of blocks, Künsch, Ann. Stat. 17 (1989), 1217. Residuals as the likelihood
     counts them are of one size, so that s_k = Σ J r; what a fit has absorbed of a misfit is seen in how it moves
-    without a block.
+    without a block. What the rest hardly tells apart moves along a valley, which is straight for a short way only: a
+    step that leaves the bounds is none, and the move is that of a fit without the block.
 
     Args:
         r: Residuals.
@@ -44,12 +63,14 @@ def left_out(
         known: H, the information of all values and of the bounds.
         blocks: Which block each row belongs to.
         more: How many values were fitted for each of these.
+        again: For steps that are too long.
     """
     least, moves = LEAST * np.diag(np.diagonal(known)), []
     for block in np.unique(blocks):
         j, one = slopes[blocks == block], r[blocks == block]
         rest = known - more * np.einsum("nci,ncj->ij", j, j, optimize=True)
-        moves.append(more * np.linalg.solve(_positive(rest, known) + least, np.einsum("nci,nc->i", j, one)))
+        step = np.linalg.solve(_positive(rest, known) + least, -more * np.einsum("nci,nc->i", j, one))
+        moves.append(step if ((again.low <= step) & (step <= again.high)).all() else again.moves(int(block), step))
     apart = np.array(moves) - np.mean(moves, axis=0)
     return (len(moves) - 1) / len(moves) * apart.T @ apart
 

@@ -14,7 +14,7 @@ from jaxtyping import Float
 
 from fitmat.fitting.coordinates import Coordinates, channel_names, coordinates
 from fitmat.fitting.correlation import Correlation, correlate
-from fitmat.fitting.information import FOLLOWS, MISSES, inverse_information
+from fitmat.fitting.information import FOLLOWS, MISSES, inverse_information, wide
 from fitmat.fitting.likelihood import Data
 from fitmat.fitting.linear import Linear, linearise
 from fitmat.fitting.losses import Loss
@@ -257,10 +257,7 @@ def by_curvature(fit: Fit) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, "
 
 
 def quantities(
-    fit: Fit,
-    sd: Float[np.ndarray, " p"],
-    ci95: Float[np.ndarray, "p 2"],
-    undetermined: Collection[str] = (),
+    fit: Fit, sd: Float[np.ndarray, " p"], ci95: Float[np.ndarray, "p 2"], undetermined: Collection[str] = ()
 ) -> list[Quantity]:
     """The model's parameters; an interval also holds the optima elsewhere that are as good.
 
@@ -269,20 +266,22 @@ def quantities(
         sd: Standard deviations.
         ci95: Intervals.
         undetermined: Names of parameters, with their channel where there are several, that are not determined beside
-            those of the fit.
+            those of the fit and those whose interval is `wide`.
     """
-    ci95, sure = np.array(ci95), np.where(coordinates(fit.model).side(fit.values) != 0, np.nan, sd)
+    moved, lost = coordinates(fit.model), wide(fit.model, fit.data.prior, ci95)
+    inside = np.isin(moved.index, fit.free) & (moved.side(fit.values) == 0)
+    ci95, sure, undetermined = np.array(ci95), np.where(inside, sd, np.nan), {*undetermined}
     for name, place in zip(fit.coordinates.names, fit.coordinates.places, strict=True):
         others = fit.elsewhere.get(name, ())
         ci95[place] = min(ci95[place, 0], *others, np.inf), max(ci95[place, 1], *others, -np.inf)
         sure[place] = np.nan if others else sure[place]
+        undetermined |= {name} if lost[place] else set()
     result = []
     for entry in fit.entries:
         p, names = entry.param, channel_names(entry, fit.measurements.channels)
-        given = np.full(entry.size, np.nan) if entry.name in fit.held else sure[entry.place]
         result.append(
             Quantity(
-                *(entry.name, p.symbol, p.unit, p.doc, fit.values[entry.place], given, ci95[entry.place]),
+                *(entry.name, p.symbol, p.unit, p.doc, fit.values[entry.place], sure[entry.place], ci95[entry.place]),
                 per_channel=bool(entry.shape),
                 remarks=tuple(_remark(fit, entry, name, undetermined) for name in names),
             )

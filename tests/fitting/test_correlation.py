@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from jaxtyping import Float
 from scipy.linalg import null_space
-from scipy.optimize import minimize
+from scipy.optimize import lsq_linear, minimize
 from scipy.stats import multivariate_normal
 
 import fitmat as fm
 from fitmat.fitting import correlation, linear
-from fitmat.fitting.left_blocks import BLOCKS, LEAST, left_out, of_few, ranges
+from fitmat.fitting.left_blocks import BLOCKS, LEAST, Again, left_out, of_few, ranges
 from fitmat.fitting.likelihood import prepare
 from fitmat.fitting.losses import LOSSES
 from fitmat.fitting.process import ASKED, LEFT_OVER, counted, factor, find, independent, kernel, matern, sizes
@@ -23,6 +23,9 @@ from fitmat.measurements.noise import measured_noise
 INCIDENCES = np.deg2rad([10.0, 30.0, 50.0])
 
 OUT = np.deg2rad(np.arange(-78.0, 79.0, 3.0))
+
+FAR = Again(np.array(-np.inf), np.array(np.inf), lambda block, step: np.full(1, np.nan))
+"""Without bounds: no step is too long."""
 
 
 def dense(places: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n n"]:
@@ -168,18 +171,71 @@ def test_a_range_left_out_moves_a_line_as_it_moves_without_it() -> None:
     expected = 3.0 / 4.0 * np.cov(np.array(again).T, bias=True) * 4.0
     assert of_few(3) == pytest.approx((3.182446 / 1.959964) ** 2, rel=1e-6)
     residual, slopes = (y - design @ best)[:, None], design[:, None, :]
-    found = left_out(residual, slopes, design.T @ design, ranges(x), 1.0)
+    found = left_out(residual, slopes, design.T @ design, ranges(x), 1.0, FAR)
     np.testing.assert_allclose(found, expected, rtol=100 * LEAST)
     every_second = np.arange(0, 60, 2)  # stands for all, each twice
-    thin = left_out(residual[every_second], slopes[every_second], design.T @ design, ranges(x)[every_second], 2.0)
+    thin = left_out(residual[every_second], slopes[every_second], design.T @ design, ranges(x)[every_second], 2.0, FAR)
     assert 0.3 < np.sqrt(thin[1, 1] / found[1, 1]) < 3.0
+
+
+def test_where_a_step_leaves_the_bounds_it_is_fitted_again() -> None:
+    """A line with a bend of which the last quarter tells alone, beside SciPy's fits within bounds without each."""
+    rng, x = np.random.default_rng(5), np.sort(np.random.default_rng(6).uniform(0.0, 2.0, 60))
+    design = np.stack([np.ones(60), x, np.maximum(x - 1.5, 0.0) + 1e-3 * x**2], axis=1)
+    y = np.sin(3.0 * x) + 0.1 * rng.normal(size=60)
+    best = np.linalg.lstsq(design, y, rcond=None)[0]
+    low, high, asked = np.array([-9.0, -9.0, -4.0]), np.array([9.0, 9.0, 4.0]), []
+    quarter = np.digitize(x, np.quantile(x, [0.25, 0.5, 0.75]))
+
+    def moves(block: int, step: np.ndarray) -> np.ndarray:
+        asked.append(block)
+        assert step[2] > high[2] or step[2] < low[2]
+        kept = quarter != block
+        return lsq_linear(design[kept], y[kept], (best + low, best + high)).x - best
+
+    residual, slopes, known = (y - design @ best)[:, None], design[:, None, :], design.T @ design
+    found = left_out(residual, slopes, known, quarter, 1.0, Again(low, high, moves))
+    assert asked == [3]
+    expected = 3.0 * np.cov(np.array([moves(k, 2.0 * high) for k in range(4)]).T, bias=True)
+    np.testing.assert_allclose(found, expected, rtol=0.01, atol=1e-4)
+    assert left_out(residual, slopes, known, quarter, 1.0, FAR)[2, 2] > 3.0 * found[2, 2]
+
+
+@pytest.fixture(scope="module")
+def valley() -> Fit:
+    """93 readings of which ks and eta trade off without one range: a straight step leaves their bounds far behind."""
+    m = two_lobes(np.deg2rad([15.0, 30.0, 45.0]), np.deg2rad(np.arange(-75.0, 76.0, 5.0)), 10, noise=0.005)
+    return fm.fit(m, "lambert+ggx")
+
+
+def test_no_misfit_makes_an_interval_wider_than_its_bounds(valley: Fit) -> None:
+    sd = np.sqrt(np.diagonal(valley.covariance)) / valley.coordinates.slope(valley.values)
+    assert valley.correlation.found
+    assert (sd < valley.coordinates.span).all()
+    assert (valley["ks"].remarks, valley["kd"].remarks) == (("not determined",), ("",))
+
+
+@pytest.mark.study
+def test_a_misfit_moves_parameters_as_fits_without_a_range_do(valley: Fit) -> None:
+    """From all starts, and without their own linear steps."""
+    m, moved, total = valley.measurements, valley.coordinates, np.zeros((4, 4))
+    h = m.wi + m.wo
+    theta_d = np.arccos(np.sum(m.wi * h, axis=1) / np.linalg.norm(h, axis=1))
+    along = ranges(theta_d), ranges(np.round(m.theta_i, 6))
+    for blocks in along:
+        kept = [dataclasses.replace(m, valid=m.valid & (blocks != k)[:, None]) for k in np.unique(blocks)]
+        again = np.array([moved.natural(fm.fit(part, "lambert+ggx").values) for part in kept])
+        total += (len(again) - 1) * np.cov(again.T, bias=True)
+    expected = np.sqrt(of_few(sum(int(blocks.max()) for blocks in along)) * np.diagonal(total))
+    sd = np.sqrt(np.diagonal(valley.covariance)) / moved.slope(valley.values)
+    np.testing.assert_allclose(sd, expected, rtol=0.2)
 
 
 def test_equal_places_lie_in_one_range_and_one_range_says_nothing() -> None:
     assert len(np.unique(ranges(np.repeat([0.1, 0.5], 10)))) == 2
     assert len(np.unique(ranges(np.arange(100.0)))) == BLOCKS
     alone = ranges(np.full(20, 0.3))
-    assert not left_out(np.ones((20, 1)), np.ones((20, 1, 1)), 20.0 * np.eye(1), alone, 1.0).any()
+    assert not left_out(np.ones((20, 1)), np.ones((20, 1, 1)), 20.0 * np.eye(1), alone, 1.0, FAR).any()
 
 
 def test_what_one_range_determines_alone_moves_finitely() -> None:
@@ -188,7 +244,7 @@ def test_what_one_range_determines_alone_moves_finitely() -> None:
     slopes[:, 0, 0], slopes[30:, 0, 1] = 1.0, 1.0
     known = np.einsum("nci,ncj->ij", slopes, slopes)
     r = np.where(np.arange(40) % 2, 1.0, -1.0)[:, None] + np.linspace(-1.0, 1.0, 40)[:, None]
-    found = left_out(r, slopes, known, ranges(np.arange(40.0)), 1.0)
+    found = left_out(r, slopes, known, ranges(np.arange(40.0)), 1.0, FAR)
     assert np.isfinite(found).all()
     assert found[1, 1] > 1e3 * found[0, 0] > 0.0
 

@@ -12,12 +12,14 @@ from scipy.optimize import least_squares
 
 import fitmat as fm
 from fitmat.fitting.coordinates import coordinates
+from fitmat.fitting.information import CONTRACTED
 from fitmat.fitting.likelihood import every_residual
 from fitmat.fitting.priors import natural_sd
 from fitmat.fitting.result import Fit
 from fitmat.judgement.identifiability.profiles import Profile, profiles
 from fitmat.judgement.identifiability.ridge import ridge
-from fitmat.judgement.identifiability.verdicts import CONTRACTED, STATES, Identifiability, identify
+from fitmat.judgement.identifiability.verdicts import STATES, Identifiability, identify
+from fitmat.maths.directions import from_angles
 from fitmat.models.parameters import with_vector
 from fitmat.uncertainty.posterior import Posterior
 
@@ -167,6 +169,36 @@ def test_a_prior_that_tells_all_is_not_the_data() -> None:
     assert group.combination is not None
     assert group.combination.name == "kd·g"
     assert group.combination.relative == pytest.approx(0.01 / np.sqrt(60), rel=0.2)  # σ is known to 1/√(2·60)
+
+
+def test_what_is_determined_is_quoted_narrowly() -> None:
+    """Random surfaces of two lobes, which neither model follows: what is determined is quoted to better than a tenth.
+
+    Of the value, or of its range; what is weakly determined, to better than what √½ of a flat prior's sd leaves.
+    """
+    told = set()
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        at, alpha, share = rng.choice([0.0, 20.0, 40.0]), rng.uniform(0.05, 0.3), rng.uniform(0.0, 0.6)
+        incidences = at + rng.choice([0.1, 10.0]) * np.arange(3)
+        lobes = [fm.model("lambert+ggx", kd=rng.uniform(0.05, 0.8), alpha=a) for a in (alpha, min(3 * alpha, 0.9))]
+        theta_i, theta_o = (p.ravel() for p in np.deg2rad(np.meshgrid(incidences, np.arange(-75, 76, 5))))
+        wi, wo = from_angles(theta_i, 0.0 * theta_i), from_angles(np.abs(theta_o), np.where(theta_o < 0, 0.0, np.pi))
+        exact = sum(w * fm.evaluate(m, wi, wo)[:, 0] for w, m in zip((1.0 - share, share), lobes, strict=True))
+        sigma = 10.0 ** rng.uniform(-2.5, -1.0) * exact
+        m = fm.from_arrays(theta_i, theta_o, exact + sigma * rng.normal(size=len(sigma)), sigma=sigma)
+        fit = fm.fit(m, ("lambert+ggx", "lambert+blinn-phong")[seed % 2])
+        posterior = fm.laplace(fit, seed=seed)
+        for verdict in identify(posterior).verdicts:
+            quantity, param = posterior[verdict.name], next(e.param for e in fit.entries if e.name == verdict.name)
+            low, high = np.log(quantity.ci95[0]) if param.scale == "log" else quantity.ci95[0]
+            span = np.log(param.upper / param.lower) if param.scale == "log" else param.upper - param.lower
+            tenth = 0.1 if param.scale == "log" else 0.1 * max(abs(quantity.value[0]), 0.01 * span)
+            most = {"determined": tenth, "weakly determined": span / np.sqrt(24.0), "not determined": np.inf}
+            assert (high - low) / (2 * 1.96) <= most[verdict.state], (seed, quantity, verdict)
+            told.add((verdict.state, quantity.remarks[0]))
+    assert {state for state, _ in told} == set(STATES)
+    assert ("determined", "not determined") not in told
 
 
 def test_nothing_free_is_said(ordinary: Fit) -> None:

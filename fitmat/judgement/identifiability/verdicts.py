@@ -5,14 +5,15 @@ It fits no other model and proposes no measurement; `design` does.
 
 import dataclasses
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
 
 from fitmat import arguments
 from fitmat.fitting.ends import AGREE
-from fitmat.fitting.information import UNDETERMINED
-from fitmat.fitting.priors import natural_sd
+from fitmat.fitting.information import CONTRACTED, UNDETERMINED, spreads, widest
+from fitmat.fitting.priors import DISCREPANCY, natural_sd
 from fitmat.fitting.result import Fit
 from fitmat.judgement.identifiability.profiles import LEVEL, Profile, profiles
 from fitmat.judgement.identifiability.ridge import Ridge, ridge
@@ -22,10 +23,6 @@ from fitmat.uncertainty.posterior import Posterior
 
 CONTRACTION_DRAWS = 4000
 """Draws behind contractions and intervals."""
-
-CONTRACTED = 0.5
-"""Contraction 1 − var_post/var_prior below which a parameter is not determined: its standard deviation is more than
-0.7 of what it was before any datum."""
 
 WEAK = 0.1
 """Standard deviation in ln p, or relative to a weight, above which a parameter is determined weakly: a tenth."""
@@ -192,11 +189,10 @@ class Identifiability:
 def identify(posterior: Posterior) -> Identifiability:
     """Say which parameters the data determine.
 
-    A parameter is not determined where the fit says so, its profile likelihood leaves it more room than `UNDETERMINED`
-    or than `CONTRACTED` of its prior, or its posterior is not narrower than that; else weakly where it is known to no
-    better than a tenth, or where starts that ended elsewhere fit as well. Draws are those of the chain where it is
-    usable, else those of the `ridge`: Laplace's would leave a bent ridge, and a chain that did not mix has not seen all
-    of it.
+    A parameter is not determined where the fit says so, its profile likelihood or its interval as quoted leaves it more
+    room than `widest`, or its posterior is not narrower than that; else weakly where it is known to no better than a
+    tenth by either, or where starts that ended elsewhere fit as well. Draws are those of the chain where it is usable,
+    else those of the `ridge`: Laplace's would leave a bent ridge, and a chain that did not mix has not seen all of it.
 
     Args:
         posterior: Of the fit.
@@ -213,7 +209,9 @@ def identify(posterior: Posterior) -> Identifiability:
     draws = _draws(posterior, ridge(fit, profiled))
     natural = fit.coordinates.natural(draws)
     contraction = 1.0 - natural.var(axis=0) / prior**2
-    verdicts = tuple(_verdict(fit, p, float(contraction[p.place]), float(prior[p.place])) for p in profiled)
+    quoted = np.concatenate([q.ci95 for q in posterior.quantities() if q.name != DISCREPANCY])
+    widths = np.stack([spreads(fit.model, quoted), widest(fit.model, fit.data.prior)], axis=1)[fit.free].tolist()
+    verdicts = tuple(_verdict(fit, p, float(contraction[p.place]), widths[p.place]) for p in profiled)
     known = fit.information[np.ix_(fit.free, fit.free)]
     return Identifiability(fit, verdicts, np.linalg.eigvalsh(known * np.outer(prior, prior)), groups(fit, draws))
 
@@ -223,7 +221,8 @@ def _draws(posterior: Posterior, along: Ridge) -> np.ndarray:
     return posterior.thinned(CONTRACTION_DRAWS)[0] if sampled else along.draws(CONTRACTION_DRAWS, seed=0)
 
 
-def _verdict(fit: Fit, profile: Profile, contraction: float, prior: float) -> Verdict:
+def _verdict(fit: Fit, profile: Profile, contraction: float, widths: Sequence[float]) -> Verdict:
+    """Of one parameter; `widths` are the standard deviation that its interval as quoted tells, and the widest."""
     k = int(fit.free[profile.place])
     entry = next(e for e in fit.entries if e.place.start <= k < e.place.stop)
     log, span = entry.param.scale == "log", entry.param.period or entry.param.upper - entry.param.lower
@@ -231,8 +230,8 @@ def _verdict(fit: Fit, profile: Profile, contraction: float, prior: float) -> Ve
     elsewhere = fit.elsewhere.get(profile.name, ())
     others = np.log(elsewhere) if log else np.array(elsewhere)
     low, high = min([profile.interval[0], *others]), max([profile.interval[1], *others])
-    sd = (high - low) / (2.0 * LEVEL)
-    most = min(UNDETERMINED["log"] if log else UNDETERMINED["linear"] * span, np.sqrt(1.0 - CONTRACTED) * prior)
+    quoted, most = widths
+    sd = float(np.fmax((high - low) / (2.0 * LEVEL), quoted))
     blind = entry.name in fit.undetermined
     lost = blind or sd > most or contraction < CONTRACTED
     misfit = lost and not blind and fit.correlation.found
