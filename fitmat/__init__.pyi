@@ -17,6 +17,7 @@ from .maths.directions import directions as directions
 from .models.base import evaluate as evaluate
 from .models.albedo import albedo as albedo
 from .models.in_rgb import fresnel_in_rgb as fresnel_in_rgb
+from .colour.metamerism import metamerism as metamerism
 from .models.multiple_scattering.surface import Surface as Surface
 from .models.multiple_scattering.random_walk import evaluate_walk as evaluate_walk
 from .models.multiple_scattering.random_walk import albedo_walk as albedo_walk

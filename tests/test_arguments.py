@@ -197,6 +197,13 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
         for name in ("evaluate_walk", "albedo_walk", "evaluate_slab")
     },
     "fresnel_in_rgb": ({"material": "Au"}, {"material": (*NOUN, *TEXT), "illuminant": (*NOUN, *TEXT)}),
+    "metamerism": (
+        {"one": np.ones(41), "other": np.full(41, 0.5), "wavelengths": np.arange(380.0, 781.0, 10.0)},
+        {
+            **dict.fromkeys(("one", "other", "wavelengths"), (*NUMBERS, 0.5, np.ones(3), np.full(41, np.nan))),
+            **dict.fromkeys(("reference", "illuminant", "observer"), (*NOUN, *TEXT, "D64")),
+        },
+    ),
     "transmittance": (
         {"theta_i": 0.5, "eta": 1.5},
         {"theta_i": (*NUMBERS, np.nan, 45.0), "eta": (*NUMBERS, np.nan, 0.0, -1.5)},

@@ -87,18 +87,43 @@ def _numbers(names: tuple[str, ...]) -> Float[np.ndarray, " c"] | None:
 
 def _spectral(wavelengths: Float[np.ndarray, " c"]) -> Colouring:
     """The formula of `colouring` on a grid of 1 nm; grey where the wavelengths do not show a colour."""
-    order = np.argsort(wavelengths)
-    known, grid, seen = wavelengths[order], observers.wavelengths(), observers.seen()
-    span, inside = f"{known[0]:g} to {known[-1]:g} nm", (grid >= known[0]) & (grid <= known[-1])
+    if (why := unseen(wavelengths)) is not None:
+        return _grey(len(wavelengths), f"{why}: drawn grey, from the mean of the channels")
+    span = f"{wavelengths.min():g} to {wavelengths.max():g} nm"
+    return Colouring(tristimulus(wavelengths), f"spectrum from {span}, seen by the CIE 1931 2° observer under D65")
+
+
+def unseen(wavelengths: Float[np.ndarray, " c"], illuminant: str = "D65", observer: str = "2") -> str | None:
+    """Why a spectrum at these wavelengths has no colour under a light, in words; None where it has one.
+
+    Args:
+        wavelengths: In nm, in any order, no two alike.
+        illuminant: As in `observers.seen`.
+        observer: As in `observers.seen`.
+    """
+    known, grid, seen = np.sort(wavelengths), observers.wavelengths(), observers.seen(illuminant, observer)
+    inside = (grid >= known[0]) & (grid <= known[-1])
     if (seen[inside].sum(axis=0) < COVERED * seen.sum(axis=0)).any():
-        return _grey(len(known), f"{span} do not cover what an eye sees: drawn grey, from the mean of the channels")
-    if (gap := np.diff(known).max()) > LARGEST_GAP:
-        words = f"wavelengths {gap:.0f} nm apart are too coarse for a colour: drawn grey, from the mean of the channels"
-        return _grey(len(known), words)
-    hats = np.stack([np.interp(grid, known, row) for row in np.eye(len(known))])
-    weights = np.empty((len(known), 3))
-    weights[order] = hats @ seen
-    return Colouring(weights, f"spectrum from {span}, seen by the CIE 1931 2° observer under D65")
+        return f"{known[0]:g} to {known[-1]:g} nm do not cover what an eye sees"
+    gap = float(np.diff(known).max())
+    return f"wavelengths {gap:.0f} nm apart are too coarse for a colour" if gap > LARGEST_GAP else None
+
+
+def tristimulus(
+    wavelengths: Float[np.ndarray, " c"], illuminant: str = "D65", observer: str = "2"
+) -> Float[np.ndarray, "c 3"]:
+    """What a reflectance of 1 at each wavelength adds to XYZ, by the formula of `colouring` under any light.
+
+    Args:
+        wavelengths: As in `unseen`, which says whether they show a colour.
+        illuminant: As in `observers.seen`.
+        observer: As in `observers.seen`.
+    """
+    order = np.argsort(wavelengths)
+    hats = np.stack([np.interp(observers.wavelengths(), wavelengths[order], row) for row in np.eye(len(order))])
+    weights = np.empty((len(order), 3))
+    weights[order] = hats @ observers.seen(illuminant, observer)
+    return weights
 
 
 def _listed(names: tuple[str, ...]) -> str:
