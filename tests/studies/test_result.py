@@ -77,6 +77,10 @@ def test_a_model_is_found_by_its_name_or_by_what_the_data_prefer(run: Path) -> N
         load(run).fitted("phong")
 
 
+WAVELENGTHS = (450, 550, 650)
+"""Names of channels, which a film takes its wavelengths from."""
+
+
 def _written(folder: Path, models: Sequence[AbstractBRDF], channels: int) -> Path:
     """A record, made without the code that makes records."""
     fits = []
@@ -91,7 +95,7 @@ def _written(folder: Path, models: Sequence[AbstractBRDF], channels: int) -> Pat
         fits.append(fit | {"doubts": [], "posterior": {"verdict": "not sampled"}})
     record = {"format": FORMAT, "fitmat": "0.1.0", "file": "a.csv", "fits": fits, "choice": None}
     folder.mkdir(exist_ok=True)
-    (folder / "fit.json").write_text(json.dumps(record | {"channels": [str(k) for k in range(channels)]}))
+    (folder / "fit.json").write_text(json.dumps(record | {"channels": [str(nm) for nm in WAVELENGTHS[:channels]]}))
     return folder
 
 
@@ -103,7 +107,8 @@ def test_every_model_is_built_again(tmp_path: Path, chosen: str | None) -> None:
     built = 0
     for name in names:
         try:
-            model = fm.model(name, masking=chosen, channels=3)
+            lines: dict[str, Any] = {"wavelengths": WAVELENGTHS} if "-film" in name else {}
+            model = fm.model(name, masking=chosen, channels=3, **lines)
         except ModelError:
             assert chosen is not None  # where there is no masking to choose
             continue
