@@ -12,7 +12,7 @@ from .models.simulation import simulate as simulate
 
 # Models
 from .models.registry import model as model
-from .judgement.choice import every_model as every_model
+from .judgement.choice.choice import every_model as every_model
 from .maths.directions import directions as directions
 from .models.base import evaluate as evaluate
 from .models.albedo import albedo as albedo
@@ -40,8 +40,8 @@ from .uncertainty.posterior import Posterior as Posterior
 
 # Judgement
 from .judgement.identifiability.verdicts import identify as identify
-from .judgement.choice import choose as choose
-from .judgement.predictive_check import check_predictions as check_predictions
+from .judgement.choice.choice import choose as choose
+from .judgement.predictive.check import check_predictions as check_predictions
 from .uncertainty.second_sampler import check_posterior as check_posterior
 from .judgement.calibration import calibrate as calibrate
 from .judgement.design.design import next_angles as next_angles

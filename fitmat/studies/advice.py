@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fitmat.judgement.choice import Choice
+from fitmat.judgement.choice.choice import Choice
 from fitmat.judgement.design.candidates import Limits
 from fitmat.judgement.design.design import MATCH, next_angles
 from fitmat.judgement.identifiability.verdicts import STATES

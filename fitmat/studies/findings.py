@@ -17,7 +17,7 @@ from fitmat.judgement.doubts import Doubts, find_doubts
 from fitmat.judgement.fit_metrics import fit_metrics
 from fitmat.judgement.identifiability.verdicts import Identifiability
 from fitmat.judgement.prediction import Section, standardised_residuals
-from fitmat.judgement.predictive_check import PredictiveCheck
+from fitmat.judgement.predictive.check import PredictiveCheck
 from fitmat.judgement.scope import describe_scope
 from fitmat.judgement.several_facets import left_out
 from fitmat.judgement.yardstick import Yardstick, explained

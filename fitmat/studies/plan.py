@@ -15,7 +15,7 @@ from fitmat.fitting.dispersed import carrying, dispersed, located
 from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.losses import loss as find_loss
 from fitmat.fitting.priors import DISCREPANCY, refuse_idle
-from fitmat.judgement.choice import every_model
+from fitmat.judgement.choice.choice import every_model
 from fitmat.measurements.samples import Measurements
 from fitmat.models import names as other_names
 from fitmat.models.parameters import entries

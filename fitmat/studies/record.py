@@ -15,9 +15,9 @@ from fitmat.fitting.dispersed import law_of
 from fitmat.fitting.quantities import UNDETERMINED, Quantity
 from fitmat.fitting.result import Fit
 from fitmat.judgement.budget import ALBEDO_DEG, COVERAGE, SOURCES, Budget, Line
-from fitmat.judgement.choice import Choice
+from fitmat.judgement.choice.choice import Choice
 from fitmat.judgement.identifiability.verdicts import Identifiability
-from fitmat.judgement.predictive_check import PredictiveCheck
+from fitmat.judgement.predictive.check import PredictiveCheck
 from fitmat.studies import match_record
 from fitmat.studies.findings import Findings
 from fitmat.studies.result import FORMAT, masking

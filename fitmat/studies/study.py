@@ -16,11 +16,11 @@ from fitmat import arguments
 from fitmat._types import Progress
 from fitmat.fitting.losses import DEFAULT
 from fitmat.judgement.budget import Line, of_draws
-from fitmat.judgement.choice import Choice, choose
+from fitmat.judgement.choice.choice import Choice, choose
 from fitmat.judgement.examination.examining import warnings
 from fitmat.judgement.identifiability.verdicts import identify
 from fitmat.judgement.prediction import sections
-from fitmat.judgement.predictive_check import check_predictions
+from fitmat.judgement.predictive.check import check_predictions
 from fitmat.judgement.yardstick import yardstick
 from fitmat.match.match import Match, compare, is_empirical, is_microfacet
 from fitmat.match.pairing import paired_draws

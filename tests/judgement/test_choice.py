@@ -13,10 +13,10 @@ from scipy import stats
 import fitmat as fm
 from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
-from fitmat.judgement import choice
-from fitmat.judgement.choice import Candidate, Choice
-from fitmat.judgement.evidence import MOST_LEFT_OUT, Evidence, weigh
-from fitmat.judgement.left_out import MOST_REFITTED, leave_incidences_out
+from fitmat.judgement.choice import choice
+from fitmat.judgement.choice.choice import Candidate, Choice
+from fitmat.judgement.choice.evidence import MOST_LEFT_OUT, Evidence, weigh
+from fitmat.judgement.choice.left_out import MOST_REFITTED, leave_incidences_out
 from fitmat.judgement.plausibility import broken_laws, doubts
 from fitmat.models.lobes.lambert import Lambert
 from fitmat.uncertainty.posterior import Posterior
@@ -181,7 +181,7 @@ def weighed_as(monkeypatch: pytest.MonkeyPatch, rough: Choice, elpd: dict[str, f
         pointwise = np.full(60, np.nan if given is None else given / 60)
         return None if given is None else dataclasses.replace(known, elpd=given, pointwise=pointwise)
 
-    monkeypatch.setattr("fitmat.judgement.choice.weigh", weigh)
+    monkeypatch.setattr("fitmat.judgement.choice.choice.weigh", weigh)
     return fm.choose([c.posterior for c in reversed(rough.candidates)], predicting=False)
 
 

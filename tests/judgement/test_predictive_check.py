@@ -9,8 +9,8 @@ from scipy import stats
 import fitmat as fm
 from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
-from fitmat.judgement import predictive_check
-from fitmat.judgement.predictive_check import PredictiveCheck, check_predictions
+from fitmat.judgement.predictive import check
+from fitmat.judgement.predictive.check import PredictiveCheck, check_predictions
 from fitmat.measurements.incidences import incidences
 from fitmat.uncertainty.posterior import Posterior
 
@@ -78,7 +78,7 @@ def test_few_draws_say_what_many_say(monkeypatch: pytest.MonkeyPatch) -> None:
     """
     posterior = fm.laplace(fm.fit(surface(3), "lambert"), seed=1, corrected=False)
     many = check_predictions(posterior, seed=2).statistics
-    monkeypatch.setattr(predictive_check, "MOST_NUMBERS", 1)
+    monkeypatch.setattr(check, "MOST_NUMBERS", 1)
     few = [check_predictions(posterior, seed=seed).statistics for seed in range(20)]
     np.testing.assert_allclose(np.median([[s.p for s in one] for one in few], axis=0), [s.p for s in many], atol=0.21)
     ends = np.array([[s.expected for s in one if s.kind == "peak"] for one in few])

@@ -12,7 +12,7 @@ from fitmat.fitting.information import information
 from fitmat.fitting.likelihood import log_pointwise, misfits
 from fitmat.fitting.refining import optima
 from fitmat.fitting.result import Fit
-from fitmat.judgement.evidence import MOST_LEFT_OUT
+from fitmat.judgement.choice.evidence import MOST_LEFT_OUT
 from fitmat.judgement.prediction import predictions
 from fitmat.measurements.incidences import incidences
 from fitmat.models.metrics import cube_root

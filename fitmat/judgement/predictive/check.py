@@ -13,7 +13,7 @@ from fitmat.fitting.losses import DEFAULT
 from fitmat.fitting.result import Fit
 from fitmat.judgement.multiplicity import adjusted_for_many
 from fitmat.judgement.prediction import predictions
-from fitmat.judgement.predictive_statistics import Replicates, Statistic
+from fitmat.judgement.predictive.statistics import Replicates, Statistic
 from fitmat.maths import normal
 from fitmat.measurements.incidences import incidences
 from fitmat.text import brief, html_table, text_table

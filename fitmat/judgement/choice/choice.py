@@ -15,8 +15,8 @@ import numpy as np
 from fitmat import arguments
 from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
-from fitmat.judgement.evidence import Evidence, weigh
-from fitmat.judgement.left_out import LeftOut, leave_incidences_out
+from fitmat.judgement.choice.evidence import Evidence, weigh
+from fitmat.judgement.choice.left_out import LeftOut, leave_incidences_out
 from fitmat.judgement.plausibility import broken_laws, doubts
 from fitmat.measurements.samples import Measurements
 from fitmat.models.registry import LOBES
