@@ -26,7 +26,6 @@ import numpy as np  # noqa: E402
 import polars as pl  # noqa: E402
 
 import fitmat as fm  # noqa: E402
-from fitmat.fitting import streamed  # noqa: E402
 from fitmat.measurements.large import chunks  # noqa: E402
 
 TRUTH: dict[str, Any] = {"kd": 0.3, "ks": 0.8, "alpha": 0.25, "eta": 1.5}
@@ -86,7 +85,7 @@ def child(path: str) -> None:
         del done, total
 
     begin = time.perf_counter()
-    found = streamed.fit_chunks(chunks.scan(path, progress=progress), "lambert+ggx", progress=progress)
+    found = passes.fit_chunks(chunks.scan(path, progress=progress), "lambert+ggx", progress=progress)
     seconds = time.perf_counter() - begin
     sd = np.sqrt(np.diagonal(found.covariance))
     print(

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from fitmat._types import Progress
 from fitmat.errors import ModelError
 from fitmat.fitting.losses import DEFAULT
-from fitmat.fitting.streamed import fit_from, fit_part, rows
+from fitmat.fitting.streamed.passes import fit_from, fit_part, rows
 from fitmat.measurements.large.stream import Stream, hold
 from fitmat.measurements.samples import Measurements
 from fitmat.studies.plan import Jobs

@@ -12,12 +12,13 @@ import pytest
 from scipy.optimize import minimize
 
 import fitmat as fm
-from fitmat.fitting import information, streamed
+from fitmat.fitting import information
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.likelihood import log_density, prepare
 from fitmat.fitting.result import Fit
-from fitmat.fitting.streamed_steps import Range
-from fitmat.fitting.streamed_sums import Sums, block_sums
+from fitmat.fitting.streamed import passes
+from fitmat.fitting.streamed.steps import Range
+from fitmat.fitting.streamed.sums import Sums, block_sums
 from fitmat.measurements.formats import csv
 from fitmat.measurements.instrument import Instrument
 from fitmat.measurements.large import chunks, noise
@@ -110,7 +111,7 @@ def scanned(gloss: Path) -> Chunks:
 
 @pytest.fixture(scope="module")
 def found(scanned: Chunks) -> Fit:
-    return streamed.fit_chunks(scanned, MODEL)
+    return passes.fit_chunks(scanned, MODEL)
 
 
 def test_a_large_text_is_fitted_as_in_one_piece(found: Fit, whole: Fit) -> None:
@@ -123,8 +124,8 @@ def test_a_large_text_is_fitted_as_in_one_piece(found: Fit, whole: Fit) -> None:
 
 def test_some_of_the_rows_show_the_way(scanned: Chunks, whole: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
     """All rows end where they did without; how far residuals bend comes from the few."""
-    monkeypatch.setattr(streamed, "FEW", 12_000)
-    found = streamed.fit_chunks(scanned, MODEL)
+    monkeypatch.setattr(passes, "FEW", 12_000)
+    found = passes.fit_chunks(scanned, MODEL)
     assert np.abs(deviations(found, whole)).max() < SAME
     assert found.discrepancy == pytest.approx(whole.discrepancy, rel=SAME_COVARIANCE)
     assert found.log_likelihood == pytest.approx(whole.log_likelihood, rel=0, abs=SAME_LIKELIHOOD)
@@ -134,14 +135,14 @@ def test_some_of_the_rows_show_the_way(scanned: Chunks, whole: Fit, monkeypatch:
 @pytest.mark.study
 def test_a_large_parquet_file_is_fitted_as_in_one_piece(whole: Fit, tmp_path: Path) -> None:
     path = saved(whole.measurements, tmp_path / "gloss.parquet")
-    assert_same(streamed.fit_chunks(chunks.scan(path, rows=13_000, part=8_000), MODEL), whole)
+    assert_same(passes.fit_chunks(chunks.scan(path, rows=13_000, part=8_000), MODEL), whole)
 
 
 @pytest.mark.study
 def test_a_far_start_ends_in_the_same_place(scanned: Chunks, found: Fit, monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps that make things worse are taken back and shortened."""
     costs: list[float] = []
-    climb, sums = streamed._climb, streamed._File.sums
+    climb, sums = passes._climb, passes._File.sums
 
     def elsewhere(file: Any, *_: Any) -> Any:
         far = with_vector(file.start.model, np.array([0.2, 0.1, 30.0]))
@@ -155,10 +156,10 @@ def test_a_far_start_ends_in_the_same_place(scanned: Chunks, found: Fit, monkeyp
         costs.append(float(result.cost))
         return result
 
-    monkeypatch.setattr(streamed, "PASSES", 40)
-    monkeypatch.setattr(streamed, "_climb", elsewhere)
-    monkeypatch.setattr(streamed._File, "sums", noted)
-    far = streamed.fit_chunks(scanned, MODEL)
+    monkeypatch.setattr(passes, "PASSES", 40)
+    monkeypatch.setattr(passes, "_climb", elsewhere)
+    monkeypatch.setattr(passes._File, "sums", noted)
+    far = passes.fit_chunks(scanned, MODEL)
     assert len(costs) > 5
     assert far.log_likelihood == pytest.approx(found.log_likelihood, rel=0, abs=SAME_LIKELIHOOD)
     assert np.abs(deviations(far, found)).max() < SAME
@@ -168,7 +169,7 @@ def test_a_far_start_ends_in_the_same_place(scanned: Chunks, found: Fit, monkeyp
 def test_what_the_data_do_not_determine_is_named(tmp_path: Path) -> None:
     """A flat surface says nothing of a lobe."""
     path = saved(masked(measured(fm.model("lambert", kd=0.3), 12)), tmp_path / "flat.csv")
-    flat = streamed.fit_chunks(chunks.scan(path, rows=13_000, part=8_000), MODEL)
+    flat = passes.fit_chunks(chunks.scan(path, rows=13_000, part=8_000), MODEL)
     assert flat.result == "unidentifiable"
     assert "exponent" in flat.undetermined
 
@@ -192,7 +193,7 @@ def coloured(colours: Path) -> Chunks:
 @pytest.mark.study
 def test_a_parameter_on_its_bound_stays_there_and_what_is_held_stays(coloured: Chunks, colours: Path) -> None:
     """The others are then where scipy's simplex finds them with that parameter at its bound."""
-    at_bound = streamed.fit_chunks(coloured, "lambert")
+    at_bound = passes.fit_chunks(coloured, "lambert")
     assert at_bound.result == "at_bound"
     assert at_bound.values[2] == 1.0
     assert np.isnan(at_bound.covariance[2]).all()
@@ -208,23 +209,23 @@ def test_a_parameter_on_its_bound_stays_there_and_what_is_held_stays(coloured: C
     sd = np.sqrt(np.diagonal(at_bound.covariance))[:2]
     assert np.abs((best.x - guess)[:2] / sd).max() < 100 * SAME
     assert guess[2] == pytest.approx(best.x[2], rel=100 * SAME)
-    held = streamed.fit_chunks(coloured, "lambert", fixed={"kd": at_bound.values})
+    held = passes.fit_chunks(coloured, "lambert", fixed={"kd": at_bound.values})
     assert held.values.tolist() == at_bound.values.tolist()
     assert held.discrepancy == pytest.approx(at_bound.discrepancy, rel=SAME)
 
 
 @pytest.mark.study
 def test_too_few_passes_are_named(coloured: Chunks, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(streamed, "PASSES", 1)
-    assert not streamed._climb(*_climber(coloured)).settled
+    monkeypatch.setattr(passes, "PASSES", 1)
+    assert not passes._climb(*_climber(coloured)).settled
     monkeypatch.undo()
-    assert streamed._climb(*_climber(coloured)).settled
+    assert passes._climb(*_climber(coloured)).settled
 
 
 def _climber(scanned: Chunks) -> Any:
     start = fm.fit(scanned.part, "lambert")
     around = Range(start)
-    return streamed._File(streamed.rows(scanned), start, None), around, around.begin, around.second_order
+    return passes._File(passes.rows(scanned), start, None), around, around.begin, around.second_order
 
 
 @pytest.mark.study
@@ -232,7 +233,7 @@ def test_a_calibration_counts_once(tmp_path: Path) -> None:
     """A prior belongs to the file, not to each block."""
     instrument = Instrument(calibration=0.02)
     path = saved(measured(fm.model("lambert", kd=0.3), 2), tmp_path / "calibrated.csv")
-    found = streamed.fit_chunks(chunks.scan(path, rows=3_000, part=8_000, instrument=instrument), "lambert")
+    found = passes.fit_chunks(chunks.scan(path, rows=3_000, part=8_000, instrument=instrument), "lambert")
     whole = fm.fit(fm.read(path, instrument=instrument), "lambert")
     assert whole.covariance[0, 0] ** 0.5 == pytest.approx(0.02 * 0.3, rel=0.02)
     assert_same(found, whole)
@@ -241,7 +242,7 @@ def test_a_calibration_counts_once(tmp_path: Path) -> None:
 def test_a_fit_without_an_optimum_ends_with_the_part(tmp_path: Path) -> None:
     m = measured(fm.model("lambert", kd=0.3), 2)
     path = saved(dataclasses.replace(m, sigma=np.full(m.value.shape, 1e-200)), tmp_path / "sharp.csv")
-    found = streamed.fit_chunks(chunks.scan(path, rows=3_000, part=1_000), "lambert")
+    found = passes.fit_chunks(chunks.scan(path, rows=3_000, part=1_000), "lambert")
     assert found.result == "nonfinite"
 
 
@@ -299,9 +300,9 @@ def test_noise_that_cannot_be_estimated_is_unknown(tmp_path: Path) -> None:
 @pytest.mark.study
 def test_progress_is_told_of_each_pass(coloured: Chunks) -> None:
     told: list[tuple[str, int, int]] = []
-    streamed.fit_chunks(coloured, "lambert", progress=lambda what, done, rows: told.append((what, done, rows)))
-    passes = list(dict.fromkeys(what for what, _, _ in told))
-    assert passes[:2] == ["pass 1", "pass 2"]
-    assert len(passes) < 7
+    passes.fit_chunks(coloured, "lambert", progress=lambda what, done, rows: told.append((what, done, rows)))
+    made = list(dict.fromkeys(what for what, _, _ in told))
+    assert made[:2] == ["pass 1", "pass 2"]
+    assert len(made) < 7
     assert [done for what, done, _ in told if what == "pass 1"] == [3_000, 6_000, 8_000]
     assert {rows for _, _, rows in told} == {8_000}

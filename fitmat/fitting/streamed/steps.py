@@ -9,7 +9,7 @@ from jaxtyping import Float
 from fitmat.fitting.discrepancy import NEGLIGIBLE
 from fitmat.fitting.information import FOLLOWS, expected_information, observed_information
 from fitmat.fitting.result import Fit
-from fitmat.fitting.streamed_sums import Sums
+from fitmat.fitting.streamed.sums import Sums
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import with_vector
 

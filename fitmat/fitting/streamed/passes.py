@@ -1,4 +1,4 @@
-"""Bulk: the fit of a file too large for memory, by passes over its chunks.
+"""Passes: the fit of a file too large for memory, by passes over its chunks.
 
 It ends where `fitting.fit` of all rows at once would end, and it keeps no rows but a part of them for the pictures and
 some to find its way by. It looks for no other optimum than the one that the part shows.
@@ -21,8 +21,8 @@ from fitmat.fitting.concluding import named_outcome
 from fitmat.fitting.information import FOLLOWS, covariance, is_positive
 from fitmat.fitting.likelihood import Data
 from fitmat.fitting.result import Fit
-from fitmat.fitting.streamed_steps import Range
-from fitmat.fitting.streamed_sums import Sums, block_curvature, block_sums, blocks, prior_sums
+from fitmat.fitting.streamed.steps import Range
+from fitmat.fitting.streamed.sums import Sums, block_curvature, block_sums, blocks, prior_sums
 from fitmat.measurements.large.noise import Scatter, scatter
 from fitmat.measurements.large.stream import Held, Stream, is_kept
 from fitmat.measurements.noise import Noise, measured_noise
