@@ -56,6 +56,7 @@ from .match.imitation import imitate as imitate
 from .studies.study import study as study
 from .studies.study import Study as Study
 from .studies.result import load as load
+from .studies.colours import colour_of as colour_of
 
 # Batch
 from .batches.batch import batch as batch

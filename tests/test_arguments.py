@@ -13,6 +13,7 @@ from fitmat.errors import FitmatError
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.terms.distributions import GGX
 from fitmat.models.terms.fresnel import White
+from fitmat.studies.result import Fitted
 
 
 @pytest.mark.parametrize(
@@ -52,7 +53,7 @@ def test_what_is_masked_or_missing_is_masked() -> None:
 MEASURED = fm.from_arrays(0.5, [0.1, 0.2, 0.3], [1.0, 1.0, 1.0])
 LAMBERT = fm.model("lambert")
 SURFACE, GLASS = fm.Surface(GGX(), (0.5, 0.5), White()), fm.Surface("ggx", 0.5, 1.5, transmits=True)
-FIT, POSTERIOR, STUDY = (object.__new__(one) for one in (fm.Fit, fm.Posterior, fm.Study))
+FIT, POSTERIOR, STUDY, FITTED = (object.__new__(one) for one in (fm.Fit, fm.Posterior, fm.Study, Fitted))
 """Of the right class and without content: nothing of it is read before the other arguments are looked at."""
 
 UP = [[0.0, 0.0, 1.0]]
@@ -342,6 +343,15 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             "seed": WHOLE,
             "resume": FOLDER,
             "progress": CALLED,
+        },
+    ),
+    "colour_of": (
+        {"fitted": FITTED},
+        {
+            "fitted": NOUN,
+            "theta_i": (*NUMBER, 45.0),
+            "theta_o": (*NUMBERS, 45.0, np.nan),
+            **dict.fromkeys(("illuminant", "observer"), (*NOUN, *TEXT, "D64")),
         },
     ),
     "load": ({"folder": "/proc/x"}, {"folder": PATH}),

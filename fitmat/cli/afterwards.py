@@ -180,7 +180,7 @@ def colour(
     plot: ColourPlotFlag = None,
     force: ReplacePictureFlag = False,
 ) -> None:
-    """Say what colour a metal or glass reflects, and how wrong Fresnel becomes in RGB."""
+    """Say what colour a metal, a glass or a fitted material is, and how wrong Fresnel becomes in RGB."""
     from fitmat.cli import colour
 
     colour.show(material, table, illuminant, plot, force=force)

@@ -1,4 +1,4 @@
-"""Colour: what Fresnel's reflectance of a material looks like, and what RGB makes of it, as the command line shows it.
+"""Colour: what a material or a run's models look like, and what RGB makes of Fresnel, as the command line shows it.
 
 It computes nothing itself.
 """
@@ -26,7 +26,7 @@ SPACES = {"srgb": "linear sRGB", "p3": "linear Display P3", "acescg": "ACEScg"}
 
 
 def show(material: str | None, table: str | None, illuminant: str, plot: Path | None, *, force: bool) -> None:
-    """Print what was asked for: one material, with its picture, or a table of all.
+    """Print what was asked for: one material, with its picture, a table of all, or the models of a run.
 
     Raises:
         FitmatError: neither or both were asked for, something is not known, or the picture cannot be written.
@@ -37,6 +37,10 @@ def show(material: str | None, table: str | None, illuminant: str, plot: Path | 
         list_all(table)
     elif material is None:
         raise ModelError("expected a material or --table: fitmat colour Au, or fitmat colour --table metals.")
+    elif Path(material).exists():
+        if plot is not None:
+            raise ModelError(f"--plot beside the run {visible(material)}, expected it with a material. Leave it out.")
+        run(material, illuminant)
     elif plot is None:
         page(fresnel_in_rgb(material, illuminant))
     else:
@@ -71,6 +75,22 @@ def page(found: InRgb) -> None:
     _say(out, f"ΔE2000 from the spectrum, under {light}; diffuse: lit from everywhere.")
     out.print(errors)
     _say(out, "\n" + "\n".join(f"{way}: {words}." for way, words in WAYS.items()))
+
+
+def run(folder: str, illuminant: str) -> None:
+    """Print the colour of every model of a run, away from the highlight, and how sure it is.
+
+    Raises:
+        FitmatError: it is no run, or its channels have no colour under that light.
+    """
+    from fitmat.studies.colours import colour_of
+    from fitmat.studies.result import load
+
+    out, result = Console(), load(folder)
+    for one in result.fits:
+        found = colour_of(one, illuminant=illuminant)
+        _say(out, f"{visible(found.sentence)} On a display: {found.srgb}.\n")
+    _say(out, "Light from 45°, seen along the normal; CIE 1931 2° observer; the white diffuser is white.")
 
 
 def list_all(kind: str) -> None:

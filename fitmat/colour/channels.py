@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from fitmat.colour import observers
 from fitmat.colour.spaces import FROM_SRGB, linear
+from fitmat.errors import FitmatError
 from fitmat.text import brief, visible
 
 COVERED = 0.95
@@ -61,6 +62,31 @@ def colouring(channels: tuple[str, ...]) -> Colouring:
     if wavelengths is None:
         return _grey(len(names), f"channels {_listed(channels)} have no known colour: drawn grey, from their mean")
     return _spectral(wavelengths)
+
+
+def colouring_under(channels: tuple[str, ...], illuminant: str, observer: str = "2") -> Float[np.ndarray, "c 3"]:
+    """CIE XYZ of each channel under a light, (c, 3); values of 1 in all channels are white, Y = 1.
+
+    Args:
+        channels: Names as in `Measurements.channels`: wavelengths in nm; for D65 and the 2° observer also r, g, b or
+            x, y, z.
+        illuminant: As in `observers.seen`.
+        observer: As in `observers.seen`.
+
+    Raises:
+        FitmatError: they have no colour under that light.
+    """
+    names = tuple(name.strip().lower() for name in channels)
+    if (illuminant, observer) == ("D65", "2") and sorted(names) in (["b", "g", "r"], ["x", "y", "z"]):
+        return colouring(channels).weights
+    wavelengths = _numbers(names) if len(names) > 1 else None
+    why = f"channels {_listed(channels)}" if wavelengths is None else unseen(wavelengths, illuminant, observer)
+    if wavelengths is None or why is not None:
+        raise FitmatError(
+            f"{why}: no colour under {illuminant} is known, expected wavelengths from 400 to 700 nm or more, every 50 "
+            "nm or closer, or r, g and b, which have one under D65."
+        )
+    return tristimulus(wavelengths, illuminant, observer)
 
 
 def sensitivities() -> Float[np.ndarray, "3 n"]:

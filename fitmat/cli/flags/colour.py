@@ -11,7 +11,8 @@ import typer
 MaterialFlag = Annotated[
     str | None,
     typer.Argument(
-        help="Au, gold, brass, N-BK7, water, …, or shelf/book/page of refractiveindex.info, as main/Au/McPeak.",
+        help="Au, gold, brass, N-BK7, water, …, shelf/book/page of refractiveindex.info, as main/Au/McPeak; or a run's "
+        "folder, for the colours of its models.",
         metavar="MATERIAL",
         show_default=False,
     ),
