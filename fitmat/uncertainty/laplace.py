@@ -114,7 +114,9 @@ def laplace_each(
                 pool.shutdown(cancel_futures=True)
                 break
             say(f"{words}, {pending[job]} is done" if many else words, min(done, total), total)
-        return [job.result() for job in reversed(list(pending)) if not job.cancelled()]
+        # In the order of submission: of several that cannot be fitted the same one is named, whichever ended first.
+        found = {name: job.result() for job, name in pending.items() if not job.cancelled()}
+        return [found[name] for name in jobs]
 
 
 def gaussian(fit: Fit) -> tuple[np.ndarray, np.ndarray]:

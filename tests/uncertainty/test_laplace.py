@@ -1,6 +1,7 @@
 """Laplace corrected by importance weights: against integrals of the density, closed forms, and where it must refuse."""
 
 import dataclasses
+import time
 from typing import Any
 
 import numpy as np
@@ -8,9 +9,11 @@ import pytest
 from scipy import integrate, stats
 
 import fitmat as fm
+from fitmat.errors import FitmatError
+from fitmat.fitting import fitting
 from fitmat.fitting.result import Fit
 from fitmat.uncertainty.density import log_posterior
-from fitmat.uncertainty.laplace import LAPLACE_DRAWS, MOST_CORRECTED, PROPOSALS, heavy_tailed, smoothed
+from fitmat.uncertainty.laplace import LAPLACE_DRAWS, MOST_CORRECTED, PROPOSALS, heavy_tailed, laplace_each, smoothed
 from fitmat.uncertainty.posterior import GOOD_PARETO, VERDICTS, Posterior
 
 EFFECTIVE = 1000
@@ -168,3 +171,16 @@ def test_reported_intervals_come_from_corrected_draws(near_bound: Fit) -> None:
     assert plain.quantities()[0].sd == pytest.approx(np.sqrt(near_bound.covariance[0, 0]))
     doubtful: Posterior = dataclasses.replace(corrected, pareto_k=0.8)
     np.testing.assert_allclose(doubtful.quantities()[0].ci95, plain.quantities()[0].ci95)
+
+
+@pytest.mark.parametrize("slow", ["phong", "ggx"])
+def test_of_several_refusals_the_same_one_is_named(monkeypatch: pytest.MonkeyPatch, slow: str) -> None:
+    """Whichever thread ends first."""
+
+    def refused(measurements: fm.Measurements, name: str) -> None:
+        time.sleep(0.2 * (name == slow))
+        raise FitmatError(name)
+
+    monkeypatch.setattr(fitting, "fit", refused)
+    with pytest.raises(FitmatError, match=r"^ggx$"):
+        laplace_each(lambert(0.5, 0.02), {"phong": {}, "ggx": {}}, seed=0)
