@@ -18,6 +18,7 @@ from fitmat.batches.atlas import SUFFIX
 from fitmat.batches.batch import PAGE, Batch, batch
 from fitmat.batches.textures import fit_texture
 from fitmat.cli import interrupts, process, session
+from fitmat.cli.flags.fitting import MODELS
 from fitmat.errors import FitmatError
 from fitmat.studies import DEFAULT_MODELS
 from fitmat.text import visible
@@ -45,14 +46,16 @@ def run(
         jobs: Table of what differs from file to file.
         reading: Arguments of `fitmat.read`.
         studying: Arguments of `fitmat.study`, models included.
-        doing: How many processes work side by side, or the scheduler of a cluster.
+        doing: How many processes work side by side, or the scheduler of a cluster; and the device.
 
     Raises:
-        FitmatError: as `batch`.
+        FitmatError: as `batch`, or the device is no CPU.
         SystemExit: it was interrupted.
     """
-    told = dict(studying)
+    told, doing = dict(studying), dict(doing)
     models = told.pop("models")
+    if (device := doing.pop("device")) != "cpu":
+        raise FitmatError(f"--device {device} for files, expected a texture (.npz): files are fitted on the CPU.")
     signal.signal(signal.SIGINT, signal.default_int_handler)
     if doing["scheduler"] is not None:
         logging.disable(logging.ERROR)  # Dask tells at length what becomes one sentence
@@ -76,7 +79,7 @@ def texture(
     idle: Mapping[str, Any],
     reading: Mapping[str, Any],
     studying: Mapping[str, Any],
-    processes: int | None,
+    doing: Mapping[str, Any],
 ) -> None:
     """Fit every point of a texture, and print how the fits ended; Ctrl-C ends it, and what was done is kept.
 
@@ -86,10 +89,10 @@ def texture(
         idle: Other flags, all of no use here, which are refused.
         reading: Arguments of `fitmat.read`.
         studying: Arguments of `fitmat.study`, of which a texture takes some.
-        processes: How many threads work side by side.
+        doing: How many threads work side by side, and on which device.
 
     Raises:
-        FitmatError: as `fit_texture`, or a flag is of no use to a texture.
+        FitmatError: as `fit_texture`, a flag is of no use to a texture, or there is no such device.
         SystemExit: it was interrupted.
     """
     said = {**idle, **reading, **reading["constants"], **studying, "instrument": not reading["instrument"].ideal}
@@ -99,14 +102,16 @@ def texture(
     if refused:
         raise FitmatError(f"{source} is a texture, for which {refused[0]} means nothing: expected no flag for it.")
     models = studying["models"]
-    model = DEFAULT_MODELS[-1] if models == ",".join(DEFAULT_MODELS) else models
+    model = DEFAULT_MODELS[-1] if models == MODELS else models
     if "," in model:
         raise FitmatError(f"--models {models} for a texture, expected one: every point has the same model.")
+    if doing["device"] == "gpu":
+        process.use_gpu()
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with session.watch() as watch:
             told = {name: studying[name] for name in ("loss", "masking", "fixed")}
-            found = fit_texture(source, folder, model, progress=watch, threads=processes, **told)
+            found = fit_texture(source, folder, model, progress=watch, threads=doing["threads"], **told)
     except KeyboardInterrupt:
         process.say(f"fitmat: interrupted; what was done is kept in {folder}: the same command goes on.", err=True)
         raise SystemExit(interrupts.INTERRUPTED) from None

@@ -1,6 +1,7 @@
-"""Commands that begin with measurements or make some: parse, one library call, print.
+"""Commands that begin with measurements of one sample or make some: parse, one library call, print.
 
-Those that begin with a result, a model or nothing are in `afterwards`.
+Those over several samples or laboratories are in `several`, those that begin with a result, a model or nothing in
+`afterwards`.
 """
 
 from pathlib import Path
@@ -10,7 +11,6 @@ import typer
 
 from fitmat.cli import examples, process
 from fitmat.cli.entry import app
-from fitmat.cli.flags.batch import BatchOutFlag, JobsFlag, McmcFlag, ProcessesFlag, SchedulerFlag, SourcesFlag
 from fitmat.cli.flags.design import CountFlag, ForFlag, KindFlag
 from fitmat.cli.flags.files import (
     ConvertedFlag,
@@ -25,6 +25,7 @@ from fitmat.cli.flags.files import (
     files,
 )
 from fitmat.cli.flags.fitting import (
+    MODELS,
     CheckPosteriorFlag,
     DispersionFlag,
     FixFlag,
@@ -41,7 +42,6 @@ from fitmat.cli.flags.fitting import (
 from fitmat.cli.flags.given import Command
 from fitmat.cli.flags.groups import takes
 from fitmat.cli.flags.instrument import instrument
-from fitmat.cli.flags.labs import LaboratoriesFlag, SurfaceFlag
 from fitmat.cli.flags.reading import reading
 from fitmat.cli.flags.simulate import (
     CatalogueFlag,
@@ -57,11 +57,7 @@ from fitmat.cli.flags.simulate import (
     ThetaIFlag,
     ThetaOFlag,
 )
-from fitmat.studies import DEFAULT_MODELS
 from fitmat.text import visible
-
-MODELS = ",".join(DEFAULT_MODELS)
-NOT_CONVERGED = 3
 
 
 @app.command(
@@ -108,7 +104,7 @@ def fit(
     if open_:
         done.open()
     if not done.converged:
-        raise typer.Exit(NOT_CONVERGED)
+        raise typer.Exit(process.NOT_CONVERGED)
 
 
 @app.command(
@@ -230,67 +226,3 @@ def design(
     process.say(design.as_json(found) if json_ else design.as_text(found))
     if plot is not None:
         design.draw(found, plot)
-
-
-@app.command(
-    cls=Command,
-    epilog=examples.LABS,
-)
-@takes(reading, instrument)
-def labs(
-    reading: dict[str, Any],
-    instrument: Any,
-    laboratories: LaboratoriesFlag,
-    model: SurfaceFlag = "lambert+ggx",
-    json_: JsonFlag = False,
-    fix: FixFlag = None,
-) -> None:
-    """Say whether laboratories that measured one sample agree, what follows from all, and whose calibration is off."""
-    process.set_up()
-    from fitmat.cli import labs
-    from fitmat.models.parameters import assignments
-
-    found = labs.compared(laboratories, reading | {"instrument": instrument}, model, assignments(fix or [], "--fix"))
-    if json_:
-        process.say(labs.as_json(found))
-    else:
-        labs.show(found)
-
-
-@app.command(
-    cls=Command,
-    epilog=examples.BATCH,
-)
-@takes(reading, instrument)
-def batch(
-    reading: dict[str, Any],
-    instrument: Any,
-    files: SourcesFlag = None,
-    out: BatchOutFlag = Path("fitmat-batch"),
-    jobs: JobsFlag = None,
-    models: ModelsFlag = MODELS,
-    processes: ProcessesFlag = None,
-    scheduler: SchedulerFlag = None,
-    mcmc: McmcFlag = False,
-    seed: SeedFlag = 0,
-    fix: FixFlag = None,
-    masking: MaskingFlag = None,
-    loss: LossFlag = "default",
-    prior: PriorFlag = None,
-    ior: IorFlag = None,
-    tilt: TiltFlag = False,
-    dispersion: DispersionFlag = None,
-) -> None:
-    """Fit every file of a folder or a list, or every point of a texture, and write one table of all."""
-    process.set_up()
-    from fitmat.cli import batch, fit
-
-    told = {"models": models, "loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
-    told |= {"dispersion": dispersion, "sampling": mcmc} | fit.known(fix or [], prior or [])
-    read = reading | {"instrument": instrument}
-    if batch.is_texture(files or []):
-        return batch.texture((files or [])[0], out, {"jobs": jobs, "scheduler": scheduler}, read, told, processes)
-    found = batch.run(files or [], out, jobs, read, told, {"processes": processes, "scheduler": scheduler})
-    batch.show(found)
-    if found.counts["refused"]:
-        raise typer.Exit(NOT_CONVERGED)

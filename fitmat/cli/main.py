@@ -10,6 +10,8 @@ import sys
 
 # Matrices are small: the threads of BLAS cost more, from the import of NumPy on, than they save.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# One fit is too small for a GPU, and several processes would fight for its memory.
+os.environ.setdefault("JAX_PLATFORMS", "cpu")
 
 from fitmat.cli import interrupts
 from fitmat.errors import FitmatError, exhausted

@@ -15,8 +15,9 @@ import typer
 from fitmat.errors import FitmatError, ReadAs
 from fitmat.text import for_shell, visible
 
-WRONG_INPUT, NOBODY_READS = 1, 141
-"""Exit codes after wrong input, and where nobody reads the output to its end: 128 + SIGPIPE, as shells count."""
+WRONG_INPUT, NOT_CONVERGED, NOBODY_READS = 1, 3, 141
+"""Exit codes: after wrong input, after a fit that did not converge, and where nobody reads the output to its end, 128 +
+SIGPIPE as shells count."""
 
 
 ADDRESSES = 2_000_000_000
@@ -111,6 +112,22 @@ def set_up() -> None:
     import jax
 
     jax.config.update("jax_enable_x64", True)
+
+
+def use_gpu() -> None:
+    """Let JAX take a GPU for what follows, where nothing was computed yet.
+
+    Raises:
+        FitmatError: it finds none.
+    """
+    import jax
+
+    jax.config.update("jax_platforms", "")
+    if jax.default_backend() == "cpu":
+        raise FitmatError(
+            "--device gpu: JAX finds no GPU here, expected one. Install JAX for it (pip install 'jax[cuda13]' for "
+            "NVIDIA's), or leave out --device."
+        )
 
 
 def misused(error: Any) -> NoReturn:

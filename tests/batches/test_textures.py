@@ -1,9 +1,11 @@
 """Textures: an atlas is fitted as its arrays are, tiles are kept and used again, and wrong files are one sentence."""
 
 import json
+import os
 import shutil
 import signal
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -47,6 +49,23 @@ def atlas(tmp_path: Path) -> Path:
     told: dict[str, Any] = arrays()
     np.savez(path, **told)
     return path
+
+
+def test_a_gpu_that_is_not_there_is_one_sentence(atlas: Path, tmp_path: Path) -> None:
+    """Neither for a texture nor for files is another device taken in its place."""
+    told = ["batch", str(atlas), "--out", str(tmp_path / "out"), "--device", "gpu"]
+    found = subprocess.run(
+        [sys.executable, "-m", "fitmat", *told],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"CUDA_VISIBLE_DEVICES": ""},
+    )
+    assert found.returncode == 1
+    assert found.stderr.splitlines()[-1].startswith("fitmat: --device gpu: JAX finds no GPU here, expected one.")
+    assert not (tmp_path / "out").exists()
+    told[1] = str(tmp_path)
+    refused = CliRunner().invoke(app, told)
+    assert "for files, expected a texture" in str(refused.exception)
 
 
 def test_an_atlas_is_fitted_as_its_arrays_are(atlas: Path, tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ They set no default and check nothing but their type.
 """
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -44,6 +44,10 @@ SchedulerFlag = Annotated[
         metavar="ADDRESS",
         show_default=False,
     ),
+]
+
+DeviceFlag = Annotated[
+    Literal["cpu", "gpu"], typer.Option(help="Where the points of a texture are fitted; files always on the CPU.")
 ]
 
 McmcFlag = Annotated[

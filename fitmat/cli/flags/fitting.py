@@ -7,6 +7,11 @@ from typing import Annotated
 
 import typer
 
+from fitmat.studies import DEFAULT_MODELS
+
+MODELS = ",".join(DEFAULT_MODELS)
+"""The default of `--models`."""
+
 ModelsFlag = Annotated[
     str,
     typer.Option(

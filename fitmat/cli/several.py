@@ -1,0 +1,106 @@
+"""Commands over many files: laboratories of one sample, and batches; parse, one library call, print.
+
+Those that begin with measurements of one sample are in `commands`.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from fitmat.cli import examples, process
+from fitmat.cli.entry import app
+from fitmat.cli.flags.batch import (
+    BatchOutFlag,
+    DeviceFlag,
+    JobsFlag,
+    McmcFlag,
+    ProcessesFlag,
+    SchedulerFlag,
+    SourcesFlag,
+)
+from fitmat.cli.flags.files import JsonFlag
+from fitmat.cli.flags.fitting import (
+    MODELS,
+    DispersionFlag,
+    FixFlag,
+    IorFlag,
+    LossFlag,
+    MaskingFlag,
+    ModelsFlag,
+    PriorFlag,
+    SeedFlag,
+    TiltFlag,
+)
+from fitmat.cli.flags.given import Command
+from fitmat.cli.flags.groups import takes
+from fitmat.cli.flags.instrument import instrument
+from fitmat.cli.flags.labs import LaboratoriesFlag, SurfaceFlag
+from fitmat.cli.flags.reading import reading
+
+
+@app.command(
+    cls=Command,
+    epilog=examples.LABS,
+)
+@takes(reading, instrument)
+def labs(
+    reading: dict[str, Any],
+    instrument: Any,
+    laboratories: LaboratoriesFlag,
+    model: SurfaceFlag = "lambert+ggx",
+    json_: JsonFlag = False,
+    fix: FixFlag = None,
+) -> None:
+    """Say whether laboratories that measured one sample agree, what follows from all, and whose calibration is off."""
+    process.set_up()
+    from fitmat.cli import labs
+    from fitmat.models.parameters import assignments
+
+    found = labs.compared(laboratories, reading | {"instrument": instrument}, model, assignments(fix or [], "--fix"))
+    if json_:
+        process.say(labs.as_json(found))
+    else:
+        labs.show(found)
+
+
+@app.command(
+    cls=Command,
+    epilog=examples.BATCH,
+)
+@takes(reading, instrument)
+def batch(
+    reading: dict[str, Any],
+    instrument: Any,
+    files: SourcesFlag = None,
+    out: BatchOutFlag = Path("fitmat-batch"),
+    jobs: JobsFlag = None,
+    models: ModelsFlag = MODELS,
+    processes: ProcessesFlag = None,
+    scheduler: SchedulerFlag = None,
+    device: DeviceFlag = "cpu",
+    mcmc: McmcFlag = False,
+    seed: SeedFlag = 0,
+    fix: FixFlag = None,
+    masking: MaskingFlag = None,
+    loss: LossFlag = "default",
+    prior: PriorFlag = None,
+    ior: IorFlag = None,
+    tilt: TiltFlag = False,
+    dispersion: DispersionFlag = None,
+) -> None:
+    """Fit every file of a folder or a list, or every point of a texture, and write one table of all."""
+    process.set_up()
+    from fitmat.cli import batch, fit
+
+    told = {"models": models, "loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
+    told |= {"dispersion": dispersion, "sampling": mcmc} | fit.known(fix or [], prior or [])
+    read = reading | {"instrument": instrument}
+    if batch.is_texture(files or []):
+        idle, doing = {"jobs": jobs, "scheduler": scheduler}, {"threads": processes, "device": device}
+        return batch.texture((files or [])[0], out, idle, read, told, doing)
+    doing = {"processes": processes, "scheduler": scheduler, "device": device}
+    found = batch.run(files or [], out, jobs, read, told, doing)
+    batch.show(found)
+    if found.counts["refused"]:
+        raise typer.Exit(process.NOT_CONVERGED)
