@@ -8,7 +8,7 @@ from pathlib import Path
 from fitmat.cli import examples, process
 from fitmat.cli.entry import app
 from fitmat.cli.flags.cache import ClearFlag
-from fitmat.cli.flags.colour import ColourPlotFlag, IlluminantFlag, MaterialFlag, TableFlag
+from fitmat.cli.flags.colour import ColourPlotFlag, EnergyFlag, IlluminantFlag, MaterialFlag, TableFlag
 from fitmat.cli.flags.export import (
     BumpFlag,
     ExportOutFlag,
@@ -178,12 +178,13 @@ def colour(
     table: TableFlag = None,
     illuminant: IlluminantFlag = "D65",
     plot: ColourPlotFlag = None,
+    energy: EnergyFlag = False,
     force: ReplacePictureFlag = False,
 ) -> None:
     """Say what colour a metal, a glass or a fitted material is, and how wrong Fresnel becomes in RGB."""
     from fitmat.cli import colour
 
-    colour.show(material, table, illuminant, plot, force=force)
+    colour.show(material, table, illuminant, plot, force=force, energy=energy)
 
 
 @app.command(cls=Command)

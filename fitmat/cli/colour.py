@@ -25,12 +25,16 @@ AT = (0, 30, 60, 80)
 SPACES = {"srgb": "linear sRGB", "p3": "linear Display P3", "acescg": "ACEScg"}
 
 
-def show(material: str | None, table: str | None, illuminant: str, plot: Path | None, *, force: bool) -> None:
+def show(
+    material: str | None, table: str | None, illuminant: str, plot: Path | None, *, force: bool, energy: bool = False
+) -> None:
     """Print what was asked for: one material, with its picture, a table of all, or the models of a run.
 
     Raises:
         FitmatError: neither or both were asked for, something is not known, or the picture cannot be written.
     """
+    if energy and (material is None or not Path(material).exists()):
+        raise ModelError("--energy without a run, expected its folder: fitmat colour RUN --energy.")
     if table is not None and (material, plot, illuminant) != (None, None, "D65"):
         raise ModelError("--table beside a material, --plot or --illuminant, expected it alone. Leave one out.")
     if table is not None:
@@ -40,7 +44,7 @@ def show(material: str | None, table: str | None, illuminant: str, plot: Path | 
     elif Path(material).exists():
         if plot is not None:
             raise ModelError(f"--plot beside the run {visible(material)}, expected it with a material. Leave it out.")
-        run(material, illuminant)
+        (energies if energy else run)(material, illuminant)
     elif plot is None:
         page(fresnel_in_rgb(material, illuminant))
     else:
@@ -91,6 +95,31 @@ def run(folder: str, illuminant: str) -> None:
         found = colour_of(one, illuminant=illuminant)
         _say(out, f"{visible(found.sentence)} On a display: {found.srgb}.\n")
     _say(out, "Light from 45°, seen along the normal; CIE 1931 2° observer; the white diffuser is white.")
+
+
+def energies(folder: str, illuminant: str) -> None:
+    """Print what renderers lose of the highlight of every model of a run that has one, by roughness and angle.
+
+    Raises:
+        FitmatError: it is no run, or its channels have no colour under that light.
+    """
+    from fitmat.studies.energies import ALPHAS, WAYS, energy_of, highlights
+    from fitmat.studies.result import load
+
+    out, any_found = Console(), False
+    for one in load(folder).fits:
+        if len(highlights(one)) != 1:
+            _say(out, f"{visible(one.name)}: no single isotropic lobe of facets.\n")
+            continue
+        own, any_found = energy_of(one, illuminant=illuminant), True
+        table = Table("alpha", "", *(f"{angle:.0f}°" for angle in np.rad2deg(own.theta)), box=None, pad_edge=False)
+        for found in (own, *(energy_of(one, alpha=alpha, illuminant=illuminant) for alpha in ALPHAS)):
+            for way, apart in found.delta_e_2000.items():
+                table.add_row(f"{found.alpha:.3g}", WAYS[way], *(f"{value:.1f}" for value in apart))
+        _say(out, f"{visible(own.sentence)}\n")
+        out.print(table)
+    if any_found:
+        _say(out, "\nΔE2000 from Heitz's random walk by angle of view, under light from everywhere.")
 
 
 def list_all(kind: str) -> None:

@@ -99,5 +99,9 @@ def test_the_command_says_the_colours_of_a_run(tmp_path: Path, capsys: pytest.Ca
     assert "lambert under daylight at noon (D65): L* 5" in out
     assert "95 % of what the data allow" in out
     assert "On a display: #b" in out  # 0.5 is 188 of 255 in sRGB
+    colour.show(str(tmp_path / "run"), None, "D65", None, force=False, energy=True)
+    assert "lambert: no single isotropic lobe of facets." in capsys.readouterr().out
+    with pytest.raises(FitmatError, match=r"--energy without a run, expected its folder"):
+        colour.show("Au", None, "D65", None, force=False, energy=True)
     with pytest.raises(FitmatError, match=r"--plot beside the run .*, expected it with a material"):
         colour.show(str(tmp_path / "run"), None, "D65", tmp_path / "a.png", force=False)

@@ -35,3 +35,8 @@ ColourPlotFlag = Annotated[
     Path | None,
     typer.Option(help="Draw colour and error by angle into this PNG, SVG or PDF.", metavar="FILE", show_default=False),
 ]
+
+EnergyFlag = Annotated[
+    bool,
+    typer.Option("--energy", help="Of a run: say what a renderer loses of each highlight, by roughness and angle."),
+]
