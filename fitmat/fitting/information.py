@@ -11,6 +11,7 @@ from jaxtyping import Array, ArrayLike, Bool, Float
 
 from fitmat.fitting.channelwise import layout
 from fitmat.fitting.coordinates import Coordinates, coordinates
+from fitmat.fitting.left_blocks import of_few
 from fitmat.fitting.likelihood import Data, Prior, every_residual, misfits
 from fitmat.fitting.priors import natural_sd
 from fitmat.maths.grams import Layout
@@ -212,6 +213,21 @@ def wide(model: AbstractBRDF, prior: Prior | None, ci95: Float[np.ndarray, "p 2"
     """Which intervals are beyond `widest`, but for parameters of which a prior tells."""
     told = False if prior is None else np.asarray(prior.precision) > 0
     return (spreads(model, ci95) > widest(model, prior)) & ~np.asarray(told)
+
+
+def unknown_spread(known: bool, count: int, parameters: int) -> float:
+    """Factor of variances where the size of all scatter is inferred with the parameters, as s is; 1 where σ is known.
+
+    As in linear regression: n/(n − p), by which s at the maximum of the likelihood is too small, and Student's
+    quantile of n − p degrees of freedom for the normal's.
+
+    Args:
+        known: Whether the noise is, given or estimated from repeats and neighbours.
+        count: n.
+        parameters: p.
+    """
+    freedom = max(count - parameters, 1)
+    return 1.0 if known else of_few(freedom) * count / freedom
 
 
 def covariance(

@@ -14,7 +14,7 @@ from jaxtyping import Float
 
 from fitmat.fitting.coordinates import Coordinates, channel_names, coordinates
 from fitmat.fitting.correlation import Correlation, correlate
-from fitmat.fitting.information import FOLLOWS, MISSES, inverse_information, wide
+from fitmat.fitting.information import FOLLOWS, MISSES, inverse_information, unknown_spread, wide
 from fitmat.fitting.likelihood import Data
 from fitmat.fitting.linear import Linear, linearise
 from fitmat.fitting.losses import Loss
@@ -246,7 +246,8 @@ def by_curvature(fit: Fit) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, "
     Both are NaN where the loss is an objective.
     """
     every, v = coordinates(fit.model), fit.values
-    sd = np.sqrt(np.diagonal(fit.covariance)) if fit.loss.posterior else np.full(len(v), np.nan)
+    few = unknown_spread(fit.noise.known, fit.n_values, len(fit.free))
+    sd = np.sqrt(few * np.diagonal(fit.covariance)) if fit.loss.posterior else np.full(len(v), np.nan)
     with np.errstate(over="ignore"):
         ratio = np.exp(Z95 * sd / every.slope(v))
         low = np.where(every.ratio, v / ratio, v - Z95 * sd)

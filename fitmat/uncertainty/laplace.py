@@ -16,7 +16,7 @@ from fitmat import arguments
 from fitmat._types import Progress
 from fitmat.fitting import fitting
 from fitmat.fitting.coordinates import Coordinates
-from fitmat.fitting.information import inverse_information
+from fitmat.fitting.information import inverse_information, unknown_spread
 from fitmat.fitting.result import Fit
 from fitmat.maths.blas import one_thread
 from fitmat.measurements.samples import Measurements
@@ -126,7 +126,8 @@ def gaussian(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     covariance = np.zeros((len(centre),) * 2)
     # The flat prior counts with the variance of its range: a direction that no datum determines is no wider than it.
     information = fit.information[np.ix_(free, free)] + np.diag(12.0 / moved.extent**2)
-    covariance[:-1, :-1] = inverse_information(information, span)
+    few = unknown_spread(fit.noise.known, fit.n_values, len(free))
+    covariance[:-1, :-1] = few * inverse_information(information, span)
     covariance[-1, -1] = _discrepancy_sd(fit) ** 2
     return scaled_gaussian(moved, centre, covariance)
 

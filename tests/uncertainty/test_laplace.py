@@ -61,6 +61,18 @@ def errors(drawn: np.ndarray, grid: np.ndarray, density: np.ndarray) -> np.ndarr
     return np.abs(np.quantile(drawn, p) - exact) / (np.sqrt(p * (1 - p) / EFFECTIVE) / height)
 
 
+def test_few_readings_of_unknown_noise_have_students_interval() -> None:
+    """∛f of a Lambert surface at one incidence is a mean: SciPy's t with 4 degrees of freedom, carried over to kd."""
+    value = 0.4 / np.pi * (1.0 + 0.02 * np.random.default_rng(3).normal(size=5))
+    fit = fm.fit(fm.from_arrays(np.full(5, 0.5), np.array([-1.2, -0.6, 0.1, 0.7, 1.2]), value), "lambert")
+    assert not fit.noise.known
+    root = np.cbrt(value)
+    half = 3.0 * np.pi * root.mean() ** 2 * stats.t.ppf(0.975, 4) * root.std(ddof=1) / np.sqrt(5.0)
+    assert np.ptp(fit["kd"].ci95) / 2.0 == pytest.approx(half, rel=1e-3)  # second order of the root
+    draws = fm.laplace(fit, seed=1, corrected=False).values
+    assert 1.96 * draws.std() == pytest.approx(half, rel=0.05)  # 2000 draws
+
+
 def test_the_corrected_discrepancy_follows_its_integral(held: Fit) -> None:
     """The likelihood of s from its definition, z(y) − z(f) = ∫ dt/(a + 3 s |t|^(2/3)), by scipy's quadrature."""
     m = held.measurements
