@@ -121,11 +121,11 @@ def correlate(
         return none
     inside, h = linear.inside, linear.factor
     first, group, r, slopes, used = _apart(linear)
-    places, near = (part[first] for part in _places(best, linear.data))
-    parts = kernel(places, np.stack([near, ~near]))
+    at, near = places(best, np.asarray(linear.data.wi)[first], np.asarray(linear.data.wo)[first])
+    parts = kernel(at, np.stack([near, ~near]))
     found, counts = find(r, slopes, used, parts), counted(used, parts)
     asked = found.gain >= ASKED
-    along = places[:, 2], np.round(np.asarray(zenith(np.asarray(linear.data.wi)[first])), 6)
+    along = at[:, 2], np.round(np.asarray(zenith(np.asarray(linear.data.wi)[first])), 6)
     again = partial(_again, best, linear, moved, asked)
     each = [(blocks, again(blocks[group])) for blocks in map(ranges, along) if blocks.any()]
     ratio, axes = np.linalg.eigh(h.T @ _spread(found, r, slopes, each, linear) @ h)
@@ -214,10 +214,12 @@ def _apart(linear: Linear) -> tuple[np.ndarray, ...]:
     return np.flatnonzero(some)[first], group, r / root, slopes / root[..., None], count > 0
 
 
-def _places(best: AbstractBRDF, data: Data) -> tuple[Float[np.ndarray, "n 3"], Bool[np.ndarray, " n"]]:
-    """Where the samples lie, in lengths of K, and which of them near the highlight."""
+def places(
+    best: AbstractBRDF, wi: Float[np.ndarray, "n 3"], wo: Float[np.ndarray, "n 3"]
+) -> tuple[Float[np.ndarray, "n 3"], Bool[np.ndarray, " n"]]:
+    """Where directions lie, in lengths of K, and which of them near the highlight."""
     width = float(widths(best, np.asarray(vector(best))[None])[0])
-    wi, h = np.asarray(data.wi), np.asarray(data.wi) + np.asarray(data.wo)
+    h = wi + wo
     h = h / np.linalg.norm(h, axis=1, keepdims=True)
     theta_d = np.arccos(np.clip(np.sum(wi * h, axis=1), -1.0, 1.0))
     away, turn = np.asarray(zenith(h)) / width, np.arctan2(h[:, 1], h[:, 0]) - np.arctan2(wi[:, 1], wi[:, 0])

@@ -16,7 +16,8 @@ from fitmat.errors import FitmatError, OutputError
 from fitmat.fitting.result import Fit
 from fitmat.judgement.design.candidates import Limits, proposed
 from fitmat.judgement.design.design import Design, Proposal
-from fitmat.judgement.design.filters import _assimilated
+from fitmat.judgement.design.filters import _assimilated, news
+from fitmat.judgement.design.likeness import Likeness
 from fitmat.reports.pictures import refuse_picture
 
 CATALOGUE = Path(__file__).parents[2] / "data" / "synthetic"
@@ -95,6 +96,37 @@ def test_a_filter_is_the_gaussian_posterior() -> None:
     joint = np.eye(5) + slopes @ prior @ slopes.T
     assert squares == pytest.approx(data @ np.linalg.solve(joint, data))
     assert logs == pytest.approx(-0.5 * (squares + np.linalg.slogdet(joint)[1]))
+
+
+@pytest.mark.parametrize(("beside", "repeats"), [(0.0, 1.0), (1.0, 1.0), (4.0, 3.0)])
+def test_readings_of_one_misfit_tell_what_they_do_together(beside: float, repeats: float) -> None:
+    """1ᵀΣ⁻¹1 of readings with Σ = σ² I + s² 1 1ᵀ, those beside taken off, over that of one reading."""
+    x, noise, s = 0.3, 0.01, 0.02
+    root = noise / (3.0 * (x + noise) ** (2.0 / 3.0))  # σ of ∛x
+
+    def information(n: int) -> float:
+        return np.linalg.inv(root**2 * np.eye(n) + s**2).sum()
+
+    expected = (information(int(beside + repeats)) - information(int(beside))) * (root**2 + s**2)
+    assert float(news(jnp.array(x), jnp.array(noise), jnp.array(s), jnp.array(beside), jnp.array(repeats))) == (
+        pytest.approx(expected)
+    )
+    assert float(news(jnp.array(x), jnp.array(noise), jnp.array(0.0), jnp.array(beside), jnp.array(repeats))) == repeats
+
+
+def test_what_is_measured_counts_beside_a_candidate(blind: Fit) -> None:
+    """At normal incidence all lies in the file; what is taken counts once more at its own place, and less far off."""
+    looked = proposed(blind, "sample", Limits(in_plane=True))
+    found = Likeness(blind, looked, 2)
+    before = found.beside.copy()
+    chosen = int(np.argmin(before))
+    assert before.min() < 0.1 * before.max()
+    found.take(chosen)
+    more = found.beside - before
+    assert more[chosen] == pytest.approx(2.0)
+    assert more.min() < 0.1
+    scans = proposed(blind, "curve", Limits())
+    np.testing.assert_array_equal(Likeness(blind, scans, 1).beside < 0.0, ~scans.used)
 
 
 @pytest.mark.study

@@ -1,8 +1,10 @@
 """Designs: which next measurement would tell most about a parameter, about all, or about which of two models is right.
 
 It measures nothing and refits nothing: what it expects holds where the model does, with s as the fit found it. Where
-the misfits of neighbours are alike, gains are those of the likelihood, and standard deviations are wider by the same
-factor before and after.
+the misfits of neighbours are alike, standard deviations are wider by the same factor before and after. A reading beside
+others shares their misfit and tells the less (`filters.news`): were it told anew each time, a D-optimal choice under a
+wrong model would repeat as many directions as there are parameters, and the fit would follow the surface nowhere else.
+For "match" the misfit is what is asked for, and each reading tells of its own.
 
 Each candidate is put to a bank of Kalman filters, one for each Gaussian of the `ridge` (the Gaussian sum of Alspach &
 Sorenson, IEEE Trans. Automatic Control 17, 1972), with several points of the ridge taken for the truth in turn. What
@@ -21,6 +23,7 @@ from fitmat.errors import FitmatError
 from fitmat.fitting.result import Fit
 from fitmat.judgement.design.candidates import Candidates, Limits, Measured, proposed
 from fitmat.judgement.design.filters import Bank, Task, bank, scores, unmeasured
+from fitmat.judgement.design.likeness import Likeness
 from fitmat.measurements.noise import channel_laws
 from fitmat.text import brief
 from fitmat.uncertainty.posterior import Posterior
@@ -116,7 +119,7 @@ def next_angles(
     determinant of their covariance (Bayesian D-optimality). For "match" the expected squared difference of the two
     models is maximised, over the variance of what the one with more discrepancy predicts (noise, discrepancy and
     parameters together), as Box & Hill (Technometrics 9, 1967) weigh it, while the other counts as the truth. Repeats
-    count as independent samples, as a fit would count them.
+    share one misfit, where the model has any.
 
     Args:
         posterior: Of a fit with at least one free parameter; only its fit is used.
@@ -153,18 +156,24 @@ def next_angles(
     match = (better, 1 - better) if target == MATCH else None
     task = Task(_law(fit), np.asarray(float(repeats)), _wanted(fit, target), match)
     history: list[int] = []
+    lone, likeness = np.where(looked.used, 0.0, -1.0), None if match else Likeness(fit, looked, repeats)
+    past = np.full((MOST_STEPS, looked.used.shape[1]), -1.0)
     proposals: list[Proposal] = []
     gains = np.zeros(0)
     wider = np.sqrt(fit.correlation.inflation)
     before, start = unmeasured(banks[0], task)
     for _ in range(count):
-        score, sd = _expected(banks, task, looked, history, ROOM[kind])
+        beside = lone if likeness is None else likeness.beside
+        score, sd = _expected(banks, task, looked, (history, past, beside), ROOM[kind])
         score = np.where(looked.near(history, APART), -np.inf, score)
         gain = np.sqrt(np.maximum(score, 0.0)) if match else np.exp(score - before)
         best = int(np.argmax(score))
         proposals.append(_proposal(looked, best, repeats, float(gain[best]), wider * sd[best]))
         gains = gains if history else gain
         before = score[best]
+        past[len(history)] = beside[best]
+        if likeness is not None:
+            likeness.take(best)
         history.append(best)
     truths = np.asarray(banks[0].centre)[np.asarray(banks[0].truths)]
     known = (fit, fits[-1] if match else None, target, kind, fit.coordinates.names, wider * start, truths)
@@ -206,20 +215,22 @@ def _proposal(looked: Candidates, best: int, repeats: int, gain: float, sd_if: n
 
 
 def _expected(
-    banks: tuple[Bank, ...], task: Task, looked: Candidates, history: list[int], room: int
+    banks: tuple[Bank, ...],
+    task: Task,
+    looked: Candidates,
+    taken: tuple[list[int], Float[np.ndarray, "h m"], Float[np.ndarray, "k m"]],
+    room: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Score of every candidate after those of the history, (k,), and the sd it leaves for each truth, (k, t, f)."""
     wi, wo = looked.directions()
+    history, past, beside = taken
     count = len(wi)
     while room < count:
         room *= 2
-    past = np.zeros((MOST_STEPS, looked.used.shape[1]), bool)
     rows = np.zeros(MOST_STEPS, int)
     rows[: len(history)] = history
-    past[: len(history)] = looked.used[history]
     every = tuple(
-        np.concatenate([part, np.tile(part[:1], (room - count, *[1] * (part.ndim - 1)))])
-        for part in (wi, wo, looked.used)
+        np.concatenate([part, np.tile(part[:1], (room - count, *[1] * (part.ndim - 1)))]) for part in (wi, wo, beside)
     )
     score, sd = scores(banks, task, every, np.asarray(count), (wi[rows], wo[rows], past))
     return np.asarray(score)[:count], np.asarray(sd)[:count]

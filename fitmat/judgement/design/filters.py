@@ -80,7 +80,8 @@ def scores(banks: tuple[Bank, ...], task: Task, candidates: Any, count: Any, his
     Args:
         banks: Of one model, or of two for the match.
         task: What is asked.
-        candidates: Directions to the light and the sensor (k, m, 3) and which samples there are (k, m).
+        candidates: Directions to the light and the sensor (k, m, 3), and beside how many readings whose misfit is alike
+            each sample is taken (k, m), −1 where there is none.
         count: How many of them there are; what stands behind is of no meaning.
         history: The same of what is measured before, (h, m, 3) and (h, m).
     """
@@ -114,7 +115,7 @@ def _taken(truth: Bank, model: Bank, task: Task, state: tuple, rows: tuple) -> t
     """The filters of a model after rows of noise-free measurements of each truth, a rank-1 update for each channel."""
 
     def row(state: tuple, given: tuple[Array, Array, Array]) -> tuple[tuple, None]:
-        wi, wo, used = given
+        wi, wo, alike = given
 
         def point(t: Array) -> tuple[Array, Array]:
             x = model.predicted(t, wi, wo)
@@ -126,7 +127,7 @@ def _taken(truth: Bank, model: Bank, task: Task, state: tuple, rows: tuple) -> t
         else:
             seen = jax.vmap(lambda t: truth.predicted(t, wi, wo))(truth.centre[truth.truths])
         noise = jnp.hypot(task.law[0] * wi[2], task.law[1] * expected)
-        weight = jnp.where(used, jnp.sqrt(task.repeats), 0.0)
+        weight = jnp.sqrt(jnp.where(alike < 0.0, 0.0, news(expected, noise, model.s, alike, task.repeats)))
 
         def z(x: Array) -> Array:
             return weight * model.loss.transform(x, noise, wi[2], model.s)
@@ -138,6 +139,27 @@ def _taken(truth: Bank, model: Bank, task: Task, state: tuple, rows: tuple) -> t
         return state, None
 
     return jax.lax.scan(row, state, rows)[0]
+
+
+def news(x: Array, noise: Array, s: Array, alike: Array, repeats: Array) -> Array:
+    """What readings tell beside others of the same misfit, in readings that are alone.
+
+    n readings at one place, each with its own noise and all with one misfit, know the place to σ²/n + s². Beside m of
+    them r more are worth I(m + r) − I(m) of one that is alone, I(n) = n/(1 − ρ + ρn), ρ = s²/(σ² + s²).
+
+    Args:
+        x: f κ.
+        noise: σ κ.
+        s: Discrepancy.
+        alike: m.
+        repeats: r.
+    """
+    share = s**2 / (s**2 + (noise / (3.0 * jnp.cbrt(jnp.abs(x) + noise) ** 2)) ** 2)
+
+    def told(n: Array) -> Array:
+        return n / (1.0 - share + share * n)
+
+    return told(jnp.maximum(alike, 0.0) + repeats) - told(jnp.maximum(alike, 0.0))
 
 
 def _assimilated(state: tuple, j: Float[Array, "e f"], apart: Float[Array, "t e"]) -> tuple:
