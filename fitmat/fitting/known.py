@@ -13,11 +13,10 @@ from fitmat.models import spectral
 from fitmat.models.in_rgb import WAYS, fresnel_in_rgb
 from fitmat.models.parameters import entries
 from fitmat.models.registry import LOBES, OVER, lobe_names, model
-from fitmat.models.terms.film import Film
 from fitmat.models.terms.fresnel import COS_82, Dielectric
 
-OPTICAL = ("eta", "kappa", "f0", "f82")
-"""Parameters that the refractive index determines."""
+OPTICAL = ("eta", "kappa", "f0", "f82", "substrate_eta", "substrate_kappa")
+"""Parameters that the refractive index determines: of the surface, or of what lies under a film."""
 
 Known = dict[str, dict[str, np.ndarray]]
 """Model name → parameter → value to hold."""
@@ -55,12 +54,12 @@ def of_material(name: str, material: str, channels: tuple[str, ...]) -> Known:
     covers, base = parts[: name.count(OVER)], parts[name.count(OVER) :]
     name = OVER.join([*covers, "+".join(renamed.get(part, part) for part in base)])
     f0, f82 = np.minimum(spectral.seen_by(channels, material, np.array([1.0, COS_82])), 1.0)
-    values: dict[str, np.ndarray] = dict(zip(OPTICAL, (eta, kappa, f0, f82), strict=True))
+    values: dict[str, np.ndarray] = dict(zip(OPTICAL, (eta, kappa, f0, f82, eta, kappa), strict=True))
     names = {e.name: e for e in entries(model(name, channels=len(channels)))}
     known = {}
     for part in renamed.values():
         own = {key for key in LOBES[part].defaults() if key in values}
-        if "kappa" in own and not metal and LOBES[part].parts["fresnel"] is not Film:
+        if "kappa" in own and not metal:
             raise ModelError(f"--ior {material} does not absorb light: use the lobe without -conductor or -belcour.")
         for key in own:
             entry = names.get(f"{part}.{key}") or names[key]

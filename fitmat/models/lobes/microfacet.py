@@ -62,8 +62,9 @@ class Microfacet(AbstractMicrofacet):
     exact dielectric, shared with the other Fresnel terms; alpha, slope parameter, 0.0001 to 1, shared: 0.05 is
     glossy plastic, 0.1 satin, 0.5 dull; with `-aniso` alpha_x and alpha_y along and across a tangent at the azimuth
     `rotation` (degrees); and the Fresnel level: eta (exact dielectric, shared), f0 (`-schlick`, per channel), f0 and
-    f82 (`-f82`, per channel), eta and kappa (`-conductor`, `-belcour`, per channel), or eta and kappa of what lies
-    under a thin film (`-film`, M. Born & E. Wolf, Principles of Optics) of a thickness and an index, both shared.
+    f82 (`-f82`, per channel), eta and kappa (`-conductor`, `-belcour`, per channel), or substrate_eta and
+    substrate_kappa (per channel) under a thin film (`-film`, M. Born & E. Wolf, Principles of Optics) of thickness,
+    film_eta, film_b and film_kappa (shared).
 
     Static choice: masking = "correlated" (Smith height-correlated, the default), "separable" (Smith, as in Walter
     2007 and Mitsuba 3), "v-cavity" (Cook & Torrance).

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, TypeVar
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ArrayLike
 
@@ -56,12 +57,12 @@ class Film(AbstractFresnel, AbstractOfChannels):
         0.0, 10.0, symbol="κ_f", starts=(0.01,), default=0.0,
         doc="imaginary part of the film's index at all wavelengths; 0 of a transparent film",
     )  # fmt: skip
-    eta: Spectrum = param(
-        0.01, 50.0, symbol="η", scale="log", per_channel=True, starts=(0.2, 1.0, 2.5), default=2.0,
+    substrate_eta: Spectrum = param(
+        0.01, 50.0, symbol="η_s", scale="log", per_channel=True, starts=(0.2, 1.0, 2.5), default=2.0,
         doc="real part of the substrate's index; titanium 1.9, silicon 4, glass 1.5",
     )  # fmt: skip
-    kappa: Spectrum = param(
-        1e-4, 50.0, symbol="κ", scale="log", per_channel=True, starts=(0.01, 3.0), default=3.0,
+    substrate_kappa: Spectrum = param(
+        1e-4, 50.0, symbol="κ_s", scale="log", per_channel=True, starts=(0.01, 3.0), default=3.0,
         doc="imaginary part of the substrate's index; metals 2–8, glass 0 (give 0.0001)",
     )  # fmt: skip
     um: tuple[float, ...] = eqx.field(static=True, default=ALONE, kw_only=True)
@@ -74,9 +75,9 @@ class Film(AbstractFresnel, AbstractOfChannels):
                 f"a film at {lines} wavelength{'s' * (lines > 1)} in a model of {max(others)} channels, expected one "
                 "wavelength for each channel. Give model(…, wavelengths=[450, 550, …]), in nm."
             )
-        um = np.array(self.um) if lines > 1 else np.float64(self.um[0])
+        um: Any = np.array(self.um) if lines > 1 else np.float64(self.um[0])
         inner = cauchy(um, self.film_eta, [(self.film_b, -2)]) + 1j * self.film_kappa
-        return film(cos_d, um, self.thickness, inner, self.eta + 1j * self.kappa)
+        return film(cos_d, um, self.thickness, inner, self.substrate_eta + 1j * self.substrate_kappa)
 
     def of_channels(self, which: np.ndarray) -> "Film":
         """The same film at some of the wavelengths."""
@@ -97,7 +98,7 @@ class Film(AbstractFresnel, AbstractOfChannels):
 
     def normal_reflectance(self) -> Spectrum:
         """The reflectance itself at normal incidence."""
-        return self(np.ones(()))
+        return self(jnp.ones(()))
 
 
 def film(cos_d: Any, um: Any, thickness: Any, inner: Any, base: Any) -> Any:

@@ -26,7 +26,7 @@ NM = np.linspace(400.0, 700.0, 31)
 NAMES = tuple(f"{nm:g}" for nm in NM)
 TITANIUM = index("Ti", NM)
 OXIDE = {"film_eta": 2.3, "film_b": 0.06, "film_kappa": 0.0}
-HELD: dict[str, Any] = {"ks": 1.0, "eta": np.real(TITANIUM), "kappa": np.imag(TITANIUM), **OXIDE}
+HELD: dict[str, Any] = {"ks": 1.0, "substrate_eta": np.real(TITANIUM), "substrate_kappa": np.imag(TITANIUM), **OXIDE}
 
 
 def measured(
@@ -37,7 +37,7 @@ def measured(
 ) -> fm.Measurements:
     """Titanium under its oxide, 2 % noise."""
     ti = index("Ti", nm)
-    known: dict[str, Any] = HELD | {"eta": np.real(ti), "kappa": np.imag(ti)}
+    known: dict[str, Any] = HELD | {"substrate_eta": np.real(ti), "substrate_kappa": np.imag(ti)}
     truth = fm.model("ggx-film", channels=len(nm), wavelengths=nm, thickness=thickness, alpha=0.15, **known)
     theta_i, theta_o = np.deg2rad(degrees), np.deg2rad(np.arange(-76.0, 77.0, 8.0))
     return fm.simulate(truth, theta_i, theta_o, relative_noise=0.02, absolute_noise=1e-3, seed=0, channels=names)
@@ -103,7 +103,7 @@ def test_wavelengths_are_the_channels() -> None:
     model = fm.model("lambert+ggx-film", channels=31, wavelengths=NM, thickness=80.0, **HELD)
     assert {e.name: e.size for e in entries(model)} == {
         **{"kd": 31, "ks": 1, "alpha": 1, "thickness": 1, "film_eta": 1, "film_b": 1, "film_kappa": 1},
-        **{"eta": 31, "kappa": 31},
+        **{"substrate_eta": 31, "substrate_kappa": 31},
     }
     up = fm.directions(0.0)
     one = located(fm.model("lambert+ggx-film", channels=31, thickness=80.0, **HELD), NAMES)
@@ -145,7 +145,9 @@ def test_thickness_is_found() -> None:
     """Of five bands, over titanium from the literature."""
     ti = index("Ti", FEW)
     m = measured(80.0, tuple(f"{nm:g}" for nm in FEW), FEW)
-    found = fm.fit(m, "ggx-film", fixed=HELD | {"eta": np.real(ti), "kappa": np.imag(ti)})["thickness"]
+    found = fm.fit(m, "ggx-film", fixed=HELD | {"substrate_eta": np.real(ti), "substrate_kappa": np.imag(ti)})[
+        "thickness"
+    ]
     assert abs(found.value[0] - 80.0) < 4.5 * found.sd[0] < 1.0
 
 
@@ -167,7 +169,9 @@ def test_orders_of_one_wavelength_are_said_to_fit_as_well() -> None:
     """Near normal incidence half a wave more of film, 119 nm, changes little: no standard deviation is told."""
     m = measured(200.0, ("550",), np.array([550.0]), (10.0, 20.0))
     ti = index("Ti", 550.0)
-    found = fm.fit(m, "ggx-film", fixed=HELD | {"eta": np.real(ti), "kappa": np.imag(ti)})["thickness"]
+    found = fm.fit(m, "ggx-film", fixed=HELD | {"substrate_eta": np.real(ti), "substrate_kappa": np.imag(ti)})[
+        "thickness"
+    ]
     assert found.remarks == ("another optimum fits as well",)
     assert np.isnan(found.sd).all()
 
@@ -175,6 +179,6 @@ def test_orders_of_one_wavelength_are_said_to_fit_as_well() -> None:
 def test_glass_carries_a_film() -> None:
     """What does not absorb is held at the least κ, where its reflectance is that of κ = 0 to 1e-8."""
     known = of_material("ggx-film", "N-BK7", ("450", "550"))["ggx-film"]
-    np.testing.assert_array_equal(known["kappa"], [1e-4, 1e-4])
-    bare = film(1.0, 0.55, 0.0, 1.4 + 0j, known["eta"][1] + 1e-4j)
-    assert bare == pytest.approx(dielectric(np.ones(1), known["eta"][1:])[0], abs=1e-8)
+    np.testing.assert_array_equal(known["substrate_kappa"], [1e-4, 1e-4])
+    bare = film(1.0, 0.55, 0.0, 1.4 + 0j, known["substrate_eta"][1] + 1e-4j)
+    assert bare == pytest.approx(dielectric(np.ones(1), known["substrate_eta"][1:])[0], abs=1e-8)
