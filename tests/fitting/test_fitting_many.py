@@ -227,6 +227,7 @@ def test_a_grid_has_valleys() -> None:
         ({"to": fm.model("lambert", channels=3)}, "the model has 3 channels and the values 1"),
         ({"to": fm.model("lambert"), "masking": "separable"}, "masking = 'separable' beside a model"),
         ({"to": "ggx-walk"}, "ggx-walk"),
+        ({"to": "ggx-film"}, "expected a model: a film has wavelengths"),
     ],
 )
 def test_wrong_arguments_are_one_sentence(told, message) -> None:

@@ -62,9 +62,9 @@ def test_a_study_holds_one_noun_for_each_model(studied: Study, measurements: Mea
 
 
 def test_a_short_study_says_the_same_of_less(
-    studied: Study, measurements: Measurements, monkeypatch: pytest.MonkeyPatch
+    studied: Study, measurements: Measurements, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """A row of a table and the verdict are those of the whole; what only a page shows is not there."""
+    """A row of a table and the verdict are those of the whole; a page can be made, which shows less."""
     found = study(measurements, NAMES, sampling=False, short=True)
     assert found.match is not None
     assert studied.match is not None
@@ -87,6 +87,8 @@ def test_a_short_study_says_the_same_of_less(
     assert said.near == {}
     for term, fall in said.grazing.items():
         assert fall.ci95 == pytest.approx(whole.grazing[term].ci95, rel=SAME)
+    with_causes = dataclasses.replace(found, match=dataclasses.replace(found.match, ablation=said))
+    assert fm.report(with_causes, tmp_path / "run").is_file()
 
 
 def test_what_is_written_is_read_back(studied: Study, tmp_path: Path) -> None:

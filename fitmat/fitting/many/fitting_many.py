@@ -26,6 +26,7 @@ from fitmat.measurements.samples import default_channels
 from fitmat.models import names
 from fitmat.models.base import AbstractBRDF, direction_pairs
 from fitmat.models.parameters import entries, holding, with_vector
+from fitmat.models.terms.film import has_film
 from fitmat.models.values import at
 
 STARTS = 3
@@ -157,6 +158,8 @@ def shared_by_all(
     if loss.infers_noise:
         raise ModelError(f"loss is {loss.name!r}, expected one that infers no noise: many fits look at no neighbours.")
     template = asked_model(to, channels, masking)
+    if isinstance(to, str) and has_film(template):
+        raise ModelError(f"to = {to!r}, expected a model: a film has wavelengths. Give model({to!r}, wavelengths=[…]).")
     held = held_values(template, names.own(template.name, {e.name for e in entries(template)}, fixed))
     moved = coordinates(template, held)
     if not moved.count:
