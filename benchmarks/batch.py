@@ -77,20 +77,26 @@ def write(folder: Path, good: int, broken: int) -> None:
         (folder / f"scan {k:04}.csv").write_text(text(k, k in bad, rng), encoding="utf-8")
 
 
+def line(sources: list[Path], out: Path, processes: int) -> list[str]:
+    """The command of a batch."""
+    words = [sys.executable, "-m", "fitmat", "batch", *map(str, sources), "--out", str(out)]
+    return [*words, "--processes", str(processes)]
+
+
+def environment(cache: Path) -> dict[str, str]:
+    """The environment without what changes how fitmat computes, and with a cache of its own."""
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(("FITMAT_", "JAX_", "OPENBLAS_"))}
+    return kept | {"XDG_CACHE_HOME": str(cache)}
+
+
 def run(sources: list[Path], out: Path, processes: int, cache: Path) -> Taken:
     """One batch by the command line."""
-    environment = {k: v for k, v in os.environ.items() if not k.startswith(("FITMAT_", "JAX_", "OPENBLAS_"))}
-    environment["XDG_CACHE_HOME"] = str(cache)
-    line = [sys.executable, "-m", "fitmat", "batch", *map(str, sources), "--out", str(out)]
+    words, told = line(sources, out, processes), environment(cache)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    wall, ended = machine.clocked(
-        lambda: subprocess.run(
-            [*line, "--processes", str(processes)], env=environment, capture_output=True, text=True, check=False
-        )
-    )
+    wall, ended = machine.clocked(lambda: subprocess.run(words, env=told, capture_output=True, text=True, check=False))
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     if ended.returncode not in (0, 3):  # 3: some files were refused
-        raise SystemExit(f"{' '.join(line)} ended with code {ended.returncode}:\n{ended.stderr}")
+        raise SystemExit(f"{' '.join(words)} ended with code {ended.returncode}:\n{ended.stderr}")
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return Taken(wall, cpu, pl.read_parquet(out / "results.parquet"))
 

@@ -1,19 +1,25 @@
-"""Kills sampling runs with `kill -9` and shows that they go on to the very same posterior.
+"""Kills sampling runs and batches with `kill -9` and shows that they go on to the very same result.
 
 A process fits a simulated file and samples the posterior with checkpoints; it is killed at random moments of the
 sampling, several times in one run, and started again until it finishes. Then its chain must be, bit for bit, that of a
 run that nobody killed.
 
-Run: python benchmarks/kill.py [--kills 20] [--seed 0]
+With --batch, `fitmat batch` of two workers studies small files, of which some are broken; at random moments it or one
+of its workers is killed, and the same command goes on. Then its table must be that of a run that nobody killed.
+
+Run: python benchmarks/kill.py [--batch] [--kills 20] [--seed 0]
 """
 
 import argparse
+import os
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 
+import batch
 import numpy as np
 
 ATTEMPTS = 4
@@ -21,6 +27,9 @@ ATTEMPTS = 4
 
 STEPS = 2000
 """Cap on the steps of a run: some seconds."""
+
+GOOD, BROKEN = 14, 2
+"""Files of a batch."""
 
 
 def child(folder: Path, out: Path, cache: Path) -> None:
@@ -69,16 +78,64 @@ def finished(folder: Path, out: Path, cache: Path) -> dict[str, np.ndarray]:
 
 
 def main() -> None:
-    """Kill, resume, compare."""
+    """Sampling or batches."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--kills", type=int, default=20, help="how many in all")
     options.add_argument("--seed", type=int, default=0, help="of the moments")
+    options.add_argument("--batch", action="store_true", help="batches instead of sampling")
     options.add_argument("--child", nargs=3, type=Path, help=argparse.SUPPRESS)
     chosen = options.parse_args()
     if chosen.child:
         child(*chosen.child)
         return
-    rng, left, run = np.random.default_rng(chosen.seed), chosen.kills, 0
+    kill = batches if chosen.batch else samplings
+    kill(chosen.kills, np.random.default_rng(chosen.seed))
+
+
+def batches(kills: int, rng: np.random.Generator) -> None:
+    """Kill a batch or one of its workers, go on, compare."""
+    left, run = kills, 0
+    with tempfile.TemporaryDirectory() as name:
+        place = Path(name)
+        scans, cache = place / "scans", place / "cache"
+        batch.write(scans, GOOD, BROKEN)
+        batch.run([scans], place / "compiling", 2, cache)
+        whole = batch.run([scans], place / "whole", 2, cache)
+        print(f"not killed: {len(whole.table)} rows, {whole.wall:.1f} s")
+        while left:
+            run += 1
+            out, met = place / f"run {run}", []
+            line, environment = batch.line([scans], out, 2), batch.environment(cache)
+            for _ in range(min(left, int(rng.integers(1, ATTEMPTS + 1)))):
+                process = subprocess.Popen(line, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+                time.sleep(rng.uniform(0.0, 0.9) * whole.wall)
+                victims = {process.pid: "the batch"} | dict.fromkeys(workers(process.pid), "a worker")
+                pid = int(rng.choice(list(victims)))
+                if process.poll() is not None:
+                    break  # too late
+                os.kill(pid, signal.SIGKILL)
+                process.wait()
+                met.append(victims[pid])
+                left -= 1
+            end = batch.run([scans], out, 2, cache)
+            same = end.table.equals(whole.table)
+            told = "the same table" if same else "ANOTHER TABLE"
+            print(f"run {run}: killed {', '.join(met) or 'nothing'}; {told}", flush=True)
+            assert same
+
+
+def workers(parent: int) -> list[int]:
+    """Processes in which a batch works, by Linux's list of children."""
+    children = Path(f"/proc/{parent}/task/{parent}/children")
+    if not children.exists():
+        return []
+    commands = {int(pid): Path(f"/proc/{pid}/cmdline").read_bytes() for pid in children.read_text().split()}
+    return [pid for pid, command in commands.items() if b"spawn_main" in command]
+
+
+def samplings(kills: int, rng: np.random.Generator) -> None:
+    """Kill, resume, compare."""
+    left, run = kills, 0
     with tempfile.TemporaryDirectory() as name:
         place, cache = Path(name), Path(name) / "compiled"
         whole = finished(place / "whole", place / "whole.npz", cache)
