@@ -60,8 +60,8 @@ draws follow the density; the others ask for emcee. Wanted are {low:g}–{high:g
 
 All parameters together: {methods}.
 Laplace falls short where a posterior is a ridge, as between kd, ks and a wide lobe of twelve readings: at its end,
-often kd = 0, the curvature sees one side of it, and where the noise is inferred from so few readings the curvature does
-not know how uncertain that is. Many of these say that they are approximate; `fitmat fit` samples by emcee unless told
+often kd = 0, the curvature sees one side of it; that the noise is inferred from so few readings is allowed for by
+Student's t. Many of these say that they are approximate; `fitmat fit` samples by emcee unless told
 not to. Truths from a narrower prior than the fits have need not be held equally often, as along the ridge of ks and
 eta, whose flat priors favour other ends than the surfaces do.
 
