@@ -172,10 +172,13 @@ class Posterior:
             undetermined: Names of parameters, with their channel where there are several, that are not determined
                 beside those of the fit.
         """
-        sampled = self.exact and self.fit.loss.posterior
-        spread = (self.sd(), self.interval()) if sampled else by_curvature(self.fit)
-        found = quantities(self.fit, *spread, undetermined)
+        found = quantities(self.fit, *self.quoted(), undetermined)
         return [*found, self._discrepancy()] if self.fit.loss.infers_discrepancy else found
+
+    def quoted(self) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, "p 2"]]:
+        """Standard deviations and 95 % intervals of the parameters that `quantities` begins with."""
+        sampled = self.exact and self.fit.loss.posterior
+        return (self.sd(), self.interval()) if sampled else by_curvature(self.fit)
 
     def _discrepancy(self) -> Quantity:
         """s; where the best fit has none, its interval is one-sided."""

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from fitmat import arguments
 from fitmat.fitting.ends import AGREE
 from fitmat.fitting.information import CONTRACTED, UNDETERMINED, spreads, widest
-from fitmat.fitting.priors import DISCREPANCY, natural_sd
+from fitmat.fitting.priors import natural_sd
 from fitmat.fitting.result import Fit
 from fitmat.judgement.identifiability.profiles import LEVEL, Profile, profiles
 from fitmat.judgement.identifiability.ridge import Ridge, ridge
@@ -209,8 +209,9 @@ def identify(posterior: Posterior) -> Identifiability:
     draws = _draws(posterior, ridge(fit, profiled))
     natural = fit.coordinates.natural(draws)
     contraction = 1.0 - natural.var(axis=0) / prior**2
-    quoted = np.concatenate([q.ci95 for q in posterior.quantities() if q.name != DISCREPANCY])
-    widths = np.stack([spreads(fit.model, quoted), widest(fit.model, fit.data.prior)], axis=1)[fit.free].tolist()
+    widths = np.stack([spreads(fit.model, posterior.quoted()[1]), widest(fit.model, fit.data.prior)], axis=1)[
+        fit.free
+    ].tolist()
     verdicts = tuple(_verdict(fit, p, float(contraction[p.place]), widths[p.place]) for p in profiled)
     known = fit.information[np.ix_(fit.free, fit.free)]
     return Identifiability(fit, verdicts, np.linalg.eigvalsh(known * np.outer(prior, prior)), groups(fit, draws))
