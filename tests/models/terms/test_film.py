@@ -141,6 +141,7 @@ def test_channels_without_wavelengths_are_refused() -> None:
 FEW = NM[::7]
 
 
+@pytest.mark.study
 def test_thickness_is_found() -> None:
     """Of five bands, over titanium from the literature."""
     ti = index("Ti", FEW)
