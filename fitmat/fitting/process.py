@@ -221,7 +221,7 @@ def _likelihood(
     grid, lead = [part.at(ratio) for part, ratio in zip(parts, ratios, strict=True)], range(len(parts))
 
     def total(which: int) -> np.ndarray:
-        each = [np.expand_dims(found[which], [j for j in lead if j != b]) for b, found in enumerate(grid)]
+        each = [np.expand_dims(found[which], tuple(j for j in lead if j != b)) for b, found in enumerate(grid)]
         return sum(each[1:], start=each[0])
 
     rest, k = len(r) - basis.shape[1], basis.shape[1]

@@ -33,7 +33,7 @@ WAYS = {"single": "single scattering", "kulla-conty": "Kulla–Conty's lobe", "t
 ALPHAS = (0.1, 0.3, 0.6, 1.0)
 """Roughnesses of a table, beside the fitted one."""
 
-ANGLES = tuple(np.deg2rad([0.0, 30.0, 60.0, 80.0]).tolist())
+ANGLES = np.deg2rad([0.0, 30.0, 60.0, 80.0])
 SAMPLES = 20_000
 
 

@@ -102,7 +102,7 @@ def test_split_rhat_is_that_of_arviz() -> None:
         chain = rng.normal(size=(steps, walkers, 4))
         chain[..., 0] = np.round(chain[..., 0])
         chain[..., 1] += np.linspace(0.0, 1.0, steps)[:, None]
-        expected = np.asarray(array_stats.rhat(chain, chain_axis=1, draw_axis=0))
+        expected = np.array(array_stats.rhat(chain, chain_axis=1, draw_axis=0), float)
         np.testing.assert_allclose(split_rhat(chain), expected, rtol=ROUNDING)
     chain[7, 1, 2] = np.nan
     np.testing.assert_array_equal(np.isnan(split_rhat(chain)), [False, False, True, False])

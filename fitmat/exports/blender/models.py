@@ -67,7 +67,7 @@ def table() -> Float[np.ndarray, "k k k"]:
     risen = 2.0 * seen * h[2] - mu > 0.0
     share = np.empty((SIZE, SIZE, SIZE))
     for k, least in enumerate(f0):
-        whole = (dielectric(np.clip(seen, 0.0, 1.0), eta_from_f0(least)) - least) / (1.0 - least)
+        whole = (dielectric(np.clip(seen, 0.0, 1.0), eta_from_f0(np.asarray(least))) - least) / (1.0 - least)
         share[k] = np.mean(np.clip(whole, 0.0, 1.0) * risen, axis=1).reshape(SIZE, SIZE).T
     return share
 
