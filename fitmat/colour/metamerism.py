@@ -81,6 +81,8 @@ def metamerism(
         arguments.choice(name, light, ILLUMINANTS)
     arguments.choice("observer", observer, OBSERVERS)
     nm = arguments.numbers("wavelengths", wavelengths, 0.0)
+    if nm.ndim != 1 or len(np.unique(nm)) != nm.size or nm.size < 2 or not np.isfinite(nm).all():
+        arguments.refuse("wavelengths", nm, "at least two different wavelengths in nm, (c,)")
     pair = np.stack([_spectrum("one", one, nm), _spectrum("other", other, nm)])
     found = {}
     for light in (reference, illuminant):
@@ -98,8 +100,6 @@ def metamerism(
 def _spectrum(name: str, given: ArrayLike, nm: np.ndarray) -> Float[np.ndarray, " c"]:
     """A spectrum of the wavelengths."""
     found = arguments.numbers(name, given)
-    if nm.ndim != 1 or len(np.unique(nm)) != nm.size or nm.size < 2 or not np.isfinite(nm).all():
-        arguments.refuse("wavelengths", nm, "at least two different wavelengths in nm, (c,)")
     if found.shape != nm.shape or not np.isfinite(found).all() or not (found.mean() > 0.0):
         arguments.refuse(name, given, f"{nm.size} finite numbers, a reflectance at each wavelength")
     return found

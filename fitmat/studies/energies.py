@@ -20,10 +20,10 @@ from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, Sum
 from fitmat.models.lobes.kulla_conty import KullaConty
 from fitmat.models.lobes.microfacet import AbstractMicrofacet, Microfacet
+from fitmat.models.lobes.turquin import Turquin
 from fitmat.models.multiple_scattering.random_walk import albedo_walk
 from fitmat.models.multiple_scattering.surface import Surface
 from fitmat.models.terms.distributions import Isotropic
-from fitmat.models.terms.energy import missing
 from fitmat.studies.result import Fitted
 from fitmat.text import brief
 
@@ -111,8 +111,6 @@ def energy_of(
     rough: Any = np.asarray(slope)
     parts = (lobe.ks, Isotropic(rough), lobe.fresnel, lobe.distribution)
     single = albedo(Microfacet(*parts), angles).value
-    lost = missing(lobe.distribution, "correlated", rough)(np.cos(angles))[:, None]
-    normal = np.asarray(lobe.fresnel.normal_reflectance())
     walked = albedo_walk(
         Surface(lobe.distribution, slope, lobe.fresnel), directions(angles), samples=samples, seed=seed
     )
@@ -125,7 +123,7 @@ def energy_of(
     ways = {
         "single": single,
         "kulla-conty": albedo(KullaConty(*parts), angles).value,
-        "turquin": single * (1.0 + normal * lost / (1.0 - lost)),
+        "turquin": single * np.asarray(Turquin(*parts).gain(np.cos(angles)[:, None])),
     }
     lit = white(illuminant)
     apart = {way: delta_e_2000(xyz(values), xyz(truth), lit) for way, values in ways.items()}

@@ -5,7 +5,7 @@ It knows isotropic roughness only.
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import equinox as eqx
 
@@ -54,8 +54,12 @@ class Turquin(AbstractMicrofacet):
 
     def __call__(self, wi: Vec3, wo: Vec3) -> Spectrum:
         """Single scattering times 1 + F0 (1 − E)/E."""
-        single, lost = self.single(wi, wo), self._missing()(wo[2])
-        return single * (1.0 + self.fresnel.normal_reflectance() * lost / (1.0 - lost))
+        return self.single(wi, wo) * self.gain(wo[2])
+
+    def gain(self, cos_o: Any) -> Any:
+        """1 + F0 (1 − E)/E towards viewers at these cosines: a number, or (a, 1); for each channel."""
+        lost = self._missing()(cos_o)
+        return 1.0 + self.fresnel.normal_reflectance() * lost / (1.0 - lost)
 
     def _missing(self) -> Missing:
         return missing(self.distribution, self.masking, self.roughness.alpha)
