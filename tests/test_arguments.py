@@ -63,6 +63,7 @@ NUMBERS = (None, "much", 1j, [[1.0], [1.0, 2.0]], {}, ["a"], True, FIT)
 NUMBER = (*NUMBERS, [0.1, 0.2], np.nan, -1.0)
 TEXT = (5, b"x", [], 1j, FIT, np.zeros(2))
 FLAG = (None, "no", 1, np.nan, [])
+POOLS = (5, b"x", "", " , ", [], [5], 1j, FIT, "lost", np.zeros(2))
 NAMED = (5, "ks=1", [("ks", 1.0)], {1: 2.0}, np.zeros(2))
 CALLED = (5, "print", [])
 PATH = (None, 5, 1j, [], FIT)
@@ -250,6 +251,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             "masking": (*TEXT, "mask"),
             **dict.fromkeys(("starts", "max_steps"), (0, *WHOLE)),
             "threads": without((0, *WHOLE), NOTHING),
+            "pool": POOLS,
             "progress": CALLED,
         },
     ),
@@ -387,6 +389,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             **dict.fromkeys(("reading", "studying"), NAMED),
             "processes": without((0, *WHOLE), NOTHING),
             "scheduler": TEXT,
+            "pool": POOLS,
             "progress": CALLED,
         },
     ),

@@ -15,9 +15,10 @@ import polars as pl
 
 from fitmat import arguments, files
 from fitmat._types import Progress
-from fitmat.batches import cluster, rows, workers
+from fitmat.batches import cluster, pools, rows, workers
 from fitmat.batches.jobs import Job, digest, every_file, from_table
 from fitmat.errors import FitmatError, OutputError
+from fitmat.fitting.pooling import Pooled, asked
 from fitmat.reports import summary
 from fitmat.studies import DEFAULT_MODELS
 from fitmat.studies.plan import named, wants_all
@@ -41,21 +42,23 @@ class Batch:
         file: The table on disk.
         table: One row for each file and model.
         counts: Files that were fitted, refused, and that were done by an earlier run.
+        pooled: Of each parameter that was pooled and each model, what the files tell of it together.
     """
 
     file: Path
     table: pl.DataFrame
     counts: Mapping[str, int]
+    pooled: tuple[Pooled, ...] = ()
 
     __repr__ = brief
 
     def __str__(self) -> str:
-        """How many files were fitted, how many were not and why."""
+        """How many files were fitted, what was pooled, and why some files were not fitted."""
         told = f"{self.counts['fitted']} of {self.counts['fitted'] + self.counts['refused']} files fitted"
         again = f" ({self.counts['earlier']} known from an earlier run)" if self.counts["earlier"] else ""
         lost = self.table.filter(pl.col("outcome").is_in([rows.REFUSED, rows.FAILED]))
         why = lost["file", "message"].iter_rows() if len(lost) else ()
-        return "\n".join([f"{told}{again}.", *(_of_file(*words) for words in why)])
+        return "\n".join([f"{told}{again}.", *map(str, self.pooled), *(_of_file(*words) for words in why)])
 
 
 def batch(
@@ -68,6 +71,7 @@ def batch(
     studying: Mapping[str, Any] | None = None,
     processes: int | None = None,
     scheduler: str | None = None,
+    pool: str | Sequence[str] | None = None,
     progress: Progress | None = None,
 ) -> Batch:
     """Study every file, and write one table of all.
@@ -82,6 +86,9 @@ def batch(
         processes: How many work side by side; None for one for each core.
         scheduler: Address of a Dask scheduler, such as "tcp://10.0.0.1:8786", whose workers do the work instead; they
             must see the files under the same paths.
+        pool: Parameters in which the files are taken to be of one kind, as the index of one lacquer: each is drawn to
+            the others as far as its own data leave it open. They are columns NAME_pooled of the table beside the
+            others; what was fitted stays.
         progress: Called with what is done next.
 
     Returns:
@@ -89,7 +96,7 @@ def batch(
 
     Raises:
         FitmatError: no file is found, a table of jobs cannot be read, another batch writes there, the disk refuses,
-            or the cluster cannot be used.
+            the cluster cannot be used, or what is to be pooled is held, unknown, or of fewer than three files.
 
     Example:
         >>> batch("scans/*.csv", "results").table  # doctest: +SKIP
@@ -102,12 +109,13 @@ def batch(
     if not wants_all(models):
         named(models)
     told = {"sampling": False} | dict(studying or {}) | {"models": models}
-    listed = _jobs(sources, jobs, dict(reading or {}), told)
+    names, listed = asked(pool), _jobs(sources, jobs, dict(reading or {}), told)
+    pools.refuse_idle(names, listed, told)
     target = Path(folder)
     if scheduler is not None and processes is not None:
         arguments.refuse("processes", processes, "None with a scheduler, whose workers are as many as they are")
     with files.alone(target):
-        return _studied(listed, target, _doing(processes, scheduler), progress or (lambda *_: None))
+        return _studied(listed, target, _doing(processes, scheduler), names, progress or (lambda *_: None))
 
 
 def _doing(processes: int | None, scheduler: str | None) -> Do:
@@ -130,7 +138,7 @@ def _jobs(sources: Any, table: Any, reading: dict[str, Any], told: dict[str, Any
     return every
 
 
-def _studied(every: Sequence[Job], target: Path, do: Do, say: Progress) -> Batch:
+def _studied(every: Sequence[Job], target: Path, do: Do, names: Sequence[str], say: Progress) -> Batch:
     """The table of all jobs; rows are kept as they come."""
     done: dict[int, list[dict[str, Any]]] = {}
     keys: dict[str, list[int]] = {}
@@ -156,13 +164,14 @@ def _studied(every: Sequence[Job], target: Path, do: Do, say: Progress) -> Batch
         done |= dict.fromkeys(keys[key], found)
         lost += len(keys[key]) * _lost(found)
         _tell(say, done, lost, len(every))
-    table = _table(every, done)
+    whole, told = pools.pool_rows(names, done)
+    table = _table(every, whole)
     memory = io.BytesIO()
     table.write_parquet(memory)
     file = files.write_bytes(target / TABLE, memory.getvalue())
-    files.write_text(target / PAGE, _page(every, done))
+    files.write_text(target / PAGE, _page(every, whole, told))
     before = sum(len(keys[key]) for key in earlier)
-    return Batch(file, table, {"fitted": len(every) - lost, "refused": lost, "earlier": before})
+    return Batch(file, table, {"fitted": len(every) - lost, "refused": lost, "earlier": before}, told)
 
 
 def _of_file(file: str, message: str) -> str:
@@ -170,11 +179,11 @@ def _of_file(file: str, message: str) -> str:
     return message if visible(message).startswith((name, visible(file))) else f"{name}: {message}"
 
 
-def _page(every: Sequence[Job], done: Mapping[int, list[dict[str, Any]]]) -> str:
+def _page(every: Sequence[Job], done: pools.Done, told: Sequence[Pooled]) -> str:
     """The page: of each file its best model, or why there is none."""
     fitted = [_best(job, done[k]) for k, job in enumerate(every) if not _lost(done[k])]
     refused = [{"message": done[k][0]["message"]} for k in range(len(every)) if _lost(done[k])]
-    return summary.to_html(fitted, refused)
+    return summary.to_html(fitted, refused, [str(one) for one in told])
 
 
 def _best(job: Job, found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -208,7 +217,7 @@ def _kept(target: Path, waiting: Mapping[str, Any]) -> Iterator[tuple[str, list[
             yield key, found
 
 
-def _table(every: Sequence[Job], done: Mapping[int, list[dict[str, Any]]]) -> pl.DataFrame:
+def _table(every: Sequence[Job], done: pools.Done) -> pl.DataFrame:
     """One row for each file and model, the columns in the order in which they first appear."""
     flat = [{"file": os.fspath(job.path)} | row for k, job in enumerate(every) for row in done[k]]
     names = [name for name in dict.fromkeys(name for row in flat for name in row) if name != rows.SWATCH]

@@ -107,7 +107,7 @@ def fit_texture(
             tiles.append(tile)
             say(f"fitting {count} points", part.stop, count)
         whole = {name: np.concatenate([tile[name] for tile in tiles]) for name in KEPT}
-        shaped = {name: part.reshape(*axes, *part.shape[1:]) for name, part in whole.items()}
+        shaped: dict[str, Any] = {name: part.reshape(*axes, *part.shape[1:]) for name, part in whole.items()}
         fits = Fits(shared.template, atlas.channels, held, **shaped)
         file = files.write_bytes(target / RESULT, _packed(_arrays(fits)))
         drawn = [files.write_bytes(target / name, content) for name, content in maps(fits).items()]

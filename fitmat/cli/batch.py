@@ -46,7 +46,7 @@ def run(
         jobs: Table of what differs from file to file.
         reading: Arguments of `fitmat.read`.
         studying: Arguments of `fitmat.study`, models included.
-        doing: How many processes work side by side, or the scheduler of a cluster; and the device.
+        doing: How many processes work side by side, or the scheduler of a cluster; the device; what to pool.
 
     Raises:
         FitmatError: as `batch`, or the device is no CPU.
@@ -128,7 +128,8 @@ def show(found: Batch, screen: Console | None = None) -> None:
     """
     out = screen or Console()
     plain = not out.is_terminal or out.is_dumb_terminal
-    count, *lost = str(found).split("\n")
+    count, *rest = str(found).split("\n")
+    lost = rest[len(found.pooled) :]
     if "best" in found.table.columns:
         best = found.table.filter(pl.col("best"))
         table = Table("file", "model", "outcome", "misfit / noise", box=None, pad_edge=False, header_style="dim")
@@ -140,6 +141,8 @@ def show(found: Batch, screen: Console | None = None) -> None:
             out.print(Text(f"and {len(best) - MOST} more", "dim"))
         out.print()
     out.print(Text(count, "bold"), soft_wrap=plain)
+    for words in found.pooled:
+        out.print(Text(str(words)), soft_wrap=plain)
     for words in lost[:MOST]:
         out.print(Text(visible(words)), soft_wrap=plain)
     if len(lost) > MOST:

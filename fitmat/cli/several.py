@@ -15,6 +15,7 @@ from fitmat.cli.flags.batch import (
     DeviceFlag,
     JobsFlag,
     McmcFlag,
+    PoolFlag,
     ProcessesFlag,
     SchedulerFlag,
     SourcesFlag,
@@ -79,6 +80,7 @@ def batch(
     processes: ProcessesFlag = None,
     scheduler: SchedulerFlag = None,
     device: DeviceFlag = "cpu",
+    pool: PoolFlag = None,
     mcmc: McmcFlag = False,
     seed: SeedFlag = 0,
     fix: FixFlag = None,
@@ -97,9 +99,9 @@ def batch(
     told |= {"dispersion": dispersion, "sampling": mcmc} | fit.known(fix or [], prior or [])
     read = reading | {"instrument": instrument}
     if batch.is_texture(files or []):
-        idle, doing = {"jobs": jobs, "scheduler": scheduler}, {"threads": processes, "device": device}
+        idle, doing = {"jobs": jobs, "scheduler": scheduler, "pool": pool}, {"threads": processes, "device": device}
         return batch.texture((files or [])[0], out, idle, read, told, doing)
-    doing = {"processes": processes, "scheduler": scheduler, "device": device}
+    doing = {"processes": processes, "scheduler": scheduler, "device": device, "pool": pool}
     found = batch.run(files or [], out, jobs, read, told, doing)
     batch.show(found)
     if found.counts["refused"]:

@@ -14,13 +14,16 @@ from fitmat.text import visible_in
 SCRIPT, STYLES = "summary.js", ("page.css", "summary.css")
 
 
-def to_html(files: Sequence[Mapping[str, Any]], refused: Sequence[Mapping[str, Any]]) -> str:
+def to_html(
+    files: Sequence[Mapping[str, Any]], refused: Sequence[Mapping[str, Any]], pooled: Sequence[str] = ()
+) -> str:
     """The page.
 
     Args:
         files: Of each file that was fitted: its name, swatch, the sentences and levels of its three cards, and the
             numbers delta_e, distance and misfit, None where there is none.
         refused: Of each that was not: its message.
+        pooled: What the files tell together, in sentences.
     """
     script = static(SCRIPT)
     return (
@@ -29,6 +32,7 @@ def to_html(files: Sequence[Mapping[str, Any]], refused: Sequence[Mapping[str, A
         .render(
             files=visible_in(list(files)),
             refused=visible_in(list(refused)),
+            pooled=visible_in(list(pooled)),
             count=len(files) + len(refused),
             policy=POLICY.format(f"'sha256-{digest(script)}'"),
             script=Markup(script),

@@ -46,6 +46,16 @@ SchedulerFlag = Annotated[
     ),
 ]
 
+PoolFlag = Annotated[
+    str | None,
+    typer.Option(
+        help="Parameters in which the files are of one kind, as eta of one lacquer: each file's is drawn to the others "
+        "as far as its own data leave it open (columns NAME_pooled).",
+        metavar="NAMES",
+        show_default=False,
+    ),
+]
+
 DeviceFlag = Annotated[
     Literal["cpu", "gpu"], typer.Option(help="Where the points of a texture are fitted; files always on the CPU.")
 ]

@@ -11,6 +11,7 @@ from jaxtyping import Float, Int
 
 from fitmat.errors import ModelError
 from fitmat.fitting.many.concluding import OUTCOMES
+from fitmat.fitting.pooling import Pooled
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import Entry, entries, with_vector
 from fitmat.text import brief
@@ -32,6 +33,7 @@ class Fits:
         log_likelihood: At the optimum, (…); of an objective −½ Σ residual².
         steps: Levenberg–Marquardt iterations of the best start, (…).
         n_values: Values that were fitted, (…).
+        pooled: Parameters that were pooled, by name, with their channel where each has its own.
     """
 
     template: AbstractBRDF
@@ -44,6 +46,7 @@ class Fits:
     log_likelihood: Float[np.ndarray, "..."]
     steps: Int[np.ndarray, "..."]
     n_values: Int[np.ndarray, "..."]
+    pooled: Mapping[str, Pooled] = dataclasses.field(default_factory=dict)
 
     __repr__ = brief
 
@@ -99,4 +102,5 @@ class Fits:
     def __str__(self) -> str:
         """How many ended how."""
         ended = ", ".join(f"{number} {name}" for name, number in self.counts.items())
-        return f"{self.outcome.size} fits of {self.name}: {ended}."
+        told = [f"{self.outcome.size} fits of {self.name}: {ended}.", *map(str, self.pooled.values())]
+        return "\n".join(told)

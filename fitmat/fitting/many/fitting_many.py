@@ -3,8 +3,10 @@
 Likelihood, bounds, convergence and outcomes are those of `fitmat.fit`. It reads no file.
 """
 
+import dataclasses
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from jaxtyping import ArrayLike, Float
@@ -12,7 +14,7 @@ from jaxtyping import ArrayLike, Float
 from fitmat import arguments
 from fitmat._types import Progress
 from fitmat.errors import FitmatError, ModelError, ReadError
-from fitmat.fitting.coordinates import coordinates
+from fitmat.fitting.coordinates import channel_names, coordinates
 from fitmat.fitting.fitting import asked_model, held_values, refuse_single_precision
 from fitmat.fitting.losses import DEFAULT, Loss
 from fitmat.fitting.losses import loss as find_loss
@@ -21,7 +23,10 @@ from fitmat.fitting.many.gathering import padded
 from fitmat.fitting.many.lanes import Shared
 from fitmat.fitting.many.table import table
 from fitmat.fitting.many.tiles import Work, each
+from fitmat.fitting.pooling import Pooled, asked, pooled, refuse_given
 from fitmat.fitting.refining import MAX_STEPS
+from fitmat.maths.hierarchy import FEWEST
+from fitmat.maths.normal import Z95
 from fitmat.measurements.samples import default_channels
 from fitmat.models import names
 from fitmat.models.base import AbstractBRDF, direction_pairs
@@ -46,6 +51,7 @@ def fit_many(
     starts: int = STARTS,
     max_steps: int = MAX_STEPS,
     threads: int | None = None,
+    pool: str | Sequence[str] | None = None,
     progress: Progress | None = None,
 ) -> Fits:
     """Fit a model to many surfaces, or to each point of one, that were seen from the same directions.
@@ -64,13 +70,16 @@ def fit_many(
         starts: From how many valleys of the start grid a fit begins, at most.
         max_steps: Levenberg–Marquardt iterations per start.
         threads: How many work side by side; None for one for each core.
+        pool: Parameters in which the surfaces are taken to be of one kind: each is drawn to the others as far as its
+            own data leave it open, `Fits.pooled`; values and deviations stay.
         progress: Called with what is done, how many surfaces are done, and how many there are.
 
     Returns:
         `Fits`; a surface that cannot be fitted is an outcome, not an exception.
 
     Raises:
-        FitmatError: float64 is off, shapes do not fit, the model is unknown, or nothing is left to fit.
+        FitmatError: float64 is off, shapes do not fit, the model is unknown, nothing is left to fit, or what is to be
+            pooled is held, unknown, or of fewer than three surfaces.
 
     Example:
         >>> wi, wo = directions(30, degrees=True), directions([0, 15, 30, 45], 180, degrees=True)  # doctest: +SKIP
@@ -83,7 +92,7 @@ def fit_many(
         arguments.whole(name, given, 1)
     arguments.whole("threads", threads, 1, optional=True)
     arguments.function("progress", progress)
-    pair = _directions(wi, wo)
+    names, pair = asked(pool), _directions(wi, wo)
     numbers = _values(value, len(pair[0]))
     noise = None if sigma is None else _noise(sigma, numbers, np.shape(value))
     shared, held = shared_by_all(pair, numbers.shape[-1], to, fixed or {}, find_loss(loss), masking)
@@ -91,6 +100,7 @@ def fit_many(
         raise FitmatError(
             f"sigma is None, expected the noise: the loss {shared.loss.name} needs it. Give it, or another."
         )
+    _refuse_idle(names, shared.template, held, int(np.prod(numbers.shape[:-2])), find_loss(loss))
     axes, flat = numbers.shape[:-2], numbers.reshape(-1, *numbers.shape[-2:])
     noise = None if noise is None else noise.reshape(flat.shape)
     work, count = Work(shared, table(shared, held), starts, max_steps), threads or os.cpu_count() or 1
@@ -102,8 +112,40 @@ def fit_many(
         count,
         progress,
     )
-    shaped = {name: part.reshape(*axes, *part.shape[1:]) for name, part in found.items()}
-    return Fits(shared.template, default_channels(numbers.shape[-1]), held, **shaped)
+    shaped: dict[str, Any] = {name: part.reshape(*axes, *part.shape[1:]) for name, part in found.items()}
+    fits = Fits(shared.template, default_channels(numbers.shape[-1]), held, **shaped)
+    return dataclasses.replace(fits, pooled=dict(_pooled(names, fits))) if names else fits
+
+
+def _refuse_idle(
+    names: Sequence[str], template: AbstractBRDF, held: Mapping[str, np.ndarray], count: int, loss: Loss
+) -> None:
+    """Stop where nothing could be pooled."""
+    refuse_given(names, held)
+    known = [entry.name for entry in entries(template)]
+    for name in names:
+        if name not in known:
+            raise ModelError(f"pool {name}: {template.name} has no such parameter, expected one of {', '.join(known)}.")
+        if count < FEWEST:
+            raise ModelError(f"pool {name}: {count} surface{'s' if count > 1 else ''}, expected at least {FEWEST}.")
+        if not loss.posterior:
+            raise ModelError(f"pool {name}: the loss {loss.name} is no likelihood, expected one that gives intervals.")
+
+
+def _pooled(names: Sequence[str], fits: Fits) -> Iterator[tuple[str, Pooled]]:
+    """Each parameter, and each channel of it, from values ± 1.96 sd of its natural coordinate."""
+    ended = np.isin(fits.result, ("converged", "at_bound", "unidentifiable"))
+    for entry in fits.entries:
+        for k, label in enumerate(channel_names(entry, fits.channels)):
+            if entry.name in names:
+                place = entry.place.start + k
+                value = fits.values[..., place]
+                reach = np.where(ended, Z95 * fits.sd[..., place], np.nan)
+                if entry.param.scale == "log":
+                    ends = value * np.exp(-reach / value), value * np.exp(reach / value)
+                else:
+                    ends = value - reach, value + reach
+                yield label, pooled(label, entry.param, *ends)
 
 
 def _directions(wi: ArrayLike, wo: ArrayLike) -> list[Float[np.ndarray, "n 3"]]:
