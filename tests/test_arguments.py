@@ -341,6 +341,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             "masking": (*TEXT, "mask"),
             "ior": (*TEXT, "Unobtainium"),
             "dispersion": (*TEXT, "snell", "cauchy"),
+            "film": (*TEXT, "Unobtainium", "TiO2"),
             **dict.fromkeys(("tilt", "sampling", "second_opinion", "full", "short"), FLAG),
             "seed": WHOLE,
             "resume": FOLDER,

@@ -29,7 +29,7 @@ READING = (
 )
 """Columns that are arguments of `fitmat.read`."""
 
-STUDYING = ("models", "loss", "masking", "ior", "tilt", "dispersion", "seed")
+STUDYING = ("models", "loss", "masking", "ior", "tilt", "dispersion", "film", "seed")
 """Columns that are arguments of `fitmat.study`."""
 
 ASSIGNED = ("fix", "prior")

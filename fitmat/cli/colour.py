@@ -42,9 +42,12 @@ def show(
     elif material is None:
         raise ModelError("expected a material or --table: fitmat colour Au, or fitmat colour --table metals.")
     elif Path(material).exists():
-        if plot is not None:
-            raise ModelError(f"--plot beside the run {visible(material)}, expected it with a material. Leave it out.")
-        (energies if energy else run)(material, illuminant)
+        if energy and plot is not None:
+            raise ModelError("--plot beside --energy, of which there is no picture. Leave one out.")
+        if energy:
+            energies(material, illuminant)
+        else:
+            run(material, illuminant, plot, force=force)
     elif plot is None:
         page(fresnel_in_rgb(material, illuminant))
     else:
@@ -81,19 +84,25 @@ def page(found: InRgb) -> None:
     _say(out, "\n" + "\n".join(f"{way}: {words}." for way, words in WAYS.items()))
 
 
-def run(folder: str, illuminant: str) -> None:
-    """Print the colour of every model of a run, away from the highlight, and how sure it is.
+def run(folder: str, illuminant: str, plot: Path | None = None, *, force: bool = False) -> None:
+    """Print the colour of every model of a run, away from the highlight, and how sure it is; draw them where asked.
 
     Raises:
-        FitmatError: it is no run, or its channels have no colour under that light.
+        FitmatError: it is no run, its channels have no colour under that light, or the picture cannot be written.
     """
     from fitmat.studies.colours import colour_of
     from fitmat.studies.result import load
 
-    out, result = Console(), load(folder)
-    for one in result.fits:
-        found = colour_of(one, illuminant=illuminant)
-        _say(out, f"{visible(found.sentence)} On a display: {found.srgb}.\n")
+    out, found = Console(), [colour_of(one, illuminant=illuminant) for one in load(folder).fits]
+    if plot is not None:
+        from fitmat.reports import colour_plot, pictures
+
+        pictures.refuse_picture(plot, force=force)
+        if found[0].grey:
+            raise ModelError(f"--plot of {visible(folder)}: one channel has no a* and b* to draw. Leave it out.")
+        pictures.write_picture(lambda: colour_plot.colours(found), plot)
+    for one in found:
+        _say(out, f"{visible(one.sentence)} On a display: {one.srgb}.\n")
     _say(out, "Light from 45°, seen along the normal; CIE 1931 2° observer; the white diffuser is white.")
 
 

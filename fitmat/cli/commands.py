@@ -28,6 +28,7 @@ from fitmat.cli.flags.fitting import (
     MODELS,
     CheckPosteriorFlag,
     DispersionFlag,
+    FilmFlag,
     FixFlag,
     FullFlag,
     IorFlag,
@@ -52,10 +53,14 @@ from fitmat.cli.flags.simulate import (
     PhiIFlag,
     SamplesFlag,
     SetFlag,
+    SimulatedFilmFlag,
+    SimulatedIorFlag,
+    SimulatedLawFlag,
     SimulatedOutFlag,
     SimulatedSeedFlag,
     ThetaIFlag,
     ThetaOFlag,
+    WavelengthsFlag,
 )
 from fitmat.text import visible
 
@@ -84,6 +89,7 @@ def fit(
     ior: IorFlag = None,
     tilt: TiltFlag = False,
     dispersion: DispersionFlag = None,
+    film: FilmFlag = None,
     full: FullFlag = False,
 ) -> None:
     """Fit models to a file of measurements and write a report with the Phong–microfacet match."""
@@ -97,7 +103,7 @@ def fit(
             from fitmat.cli import fit
 
             told = {"models": models, "loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
-            told |= fit.known(fix or [], prior or []) | {"dispersion": dispersion}
+            told |= fit.known(fix or [], prior or []) | {"dispersion": dispersion, "film": film}
             told |= {"sampling": not no_mcmc, "second_opinion": check_posterior, "full": full}
             done = fit.write_report(files, out, reading | {"instrument": instrument}, told, watch, force=force)
     done.tell(as_json=json_)
@@ -126,6 +132,10 @@ def simulate(
     seed: SimulatedSeedFlag = 0,
     samples: SamplesFlag = None,
     masking: MaskingFlag = None,
+    wavelengths: WavelengthsFlag = None,
+    ior: SimulatedIorFlag = None,
+    film: SimulatedFilmFlag = None,
+    dispersion: SimulatedLawFlag = None,
     catalogue: CatalogueFlag = None,
     force: ReplaceFlag = False,
 ) -> None:
@@ -136,10 +146,11 @@ def simulate(
     if catalogue is not None:
         written = simulate.write_catalogue(catalogue, force=force)
     else:
-        angles, truth = simulate.grid(theta_i, theta_o, phi, phi_i), simulate.truth(model, set_ or [], masking)
-        written = simulate.write_simulation(
-            out, truth, angles, noise=(noise, floor, seed), samples=samples, instrument=instrument, force=force
-        )
+        angles = simulate.grid(theta_i, theta_o, phi, phi_i)
+        known = {"ior": ior, "film": film, "dispersion": dispersion}
+        truth, channels = simulate.truth(model, set_ or [], masking, wavelengths, **known)
+        measuring = {"noise": (noise, floor, seed), "samples": samples, "instrument": instrument}
+        written = simulate.write_simulation(out, truth, angles, channels, **measuring, force=force)
     process.say("\n".join(visible(str(path)) for path in written))
 
 

@@ -21,8 +21,11 @@ FIT = (
 
 SIMULATE = (
     "Parameters that are not set keep the model's defaults, see fitmat models.\n\n"
-    "Example:\n\n"
+    "Examples:\n\n"
     "  fitmat simulate lambert+ggx --set kd=0.3 --set alpha=0.2 --out plastic.csv\n\n"
+    "  fitmat simulate ggx --ior Au --wavelengths 400:700:10 --set alpha=0.1 --out gold.csv\n\n"
+    "  fitmat simulate ggx-film --film TiO2 --ior Ti --set thickness=50 --wavelengths 400:700:10 --out blue.csv\n\n"
+    "  fitmat simulate lambert+ggx --dispersion cauchy --set cauchy_a=1.48 --wavelengths 400:700:10 --out clear.csv\n\n"
     "  fitmat simulate ggx-slab-schlick --set alpha=0.6 --set f0=0.9 --samples 4096 --out rough.csv"
 )
 

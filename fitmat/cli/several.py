@@ -24,6 +24,7 @@ from fitmat.cli.flags.files import JsonFlag
 from fitmat.cli.flags.fitting import (
     MODELS,
     DispersionFlag,
+    FilmFlag,
     FixFlag,
     IorFlag,
     LossFlag,
@@ -90,13 +91,14 @@ def batch(
     ior: IorFlag = None,
     tilt: TiltFlag = False,
     dispersion: DispersionFlag = None,
+    film: FilmFlag = None,
 ) -> None:
     """Fit every file of a folder or a list, or every point of a texture, and write one table of all."""
     process.set_up()
     from fitmat.cli import batch, fit
 
     told = {"models": models, "loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
-    told |= {"dispersion": dispersion, "sampling": mcmc} | fit.known(fix or [], prior or [])
+    told |= {"dispersion": dispersion, "film": film, "sampling": mcmc} | fit.known(fix or [], prior or [])
     read = reading | {"instrument": instrument}
     if batch.is_texture(files or []):
         idle, doing = {"jobs": jobs, "scheduler": scheduler, "pool": pool}, {"threads": processes, "device": device}

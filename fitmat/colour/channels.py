@@ -69,7 +69,7 @@ def colouring_under(channels: tuple[str, ...], illuminant: str, observer: str = 
 
     Args:
         channels: Names as in `Measurements.channels`: wavelengths in nm; for D65 and the 2° observer also r, g, b or
-            x, y, z.
+            x, y, z; one channel of any name is a grey under every light.
         illuminant: As in `observers.seen`.
         observer: As in `observers.seen`.
 
@@ -79,7 +79,9 @@ def colouring_under(channels: tuple[str, ...], illuminant: str, observer: str = 
     names = tuple(name.strip().lower() for name in channels)
     if (illuminant, observer) == ("D65", "2") and sorted(names) in (["b", "g", "r"], ["x", "y", "z"]):
         return colouring(channels).weights
-    wavelengths = _numbers(names) if len(names) > 1 else None
+    if len(names) == 1:
+        return observers.white(illuminant, observer)[None]
+    wavelengths = _numbers(names)
     why = f"channels {_listed(channels)}" if wavelengths is None else unseen(wavelengths, illuminant, observer)
     if wavelengths is None or why is not None:
         raise FitmatError(

@@ -12,8 +12,13 @@ from fitmat.measurements.samples import IN_PLANE, Measurements
 from fitmat.models import spectral
 from fitmat.models.in_rgb import WAYS, fresnel_in_rgb
 from fitmat.models.parameters import entries
+from fitmat.models.refractive_index import channel_wavelengths, index
 from fitmat.models.registry import LOBES, OVER, lobe_names, model
+from fitmat.models.terms.film import Film
 from fitmat.models.terms.fresnel import COS_82, Dielectric
+
+FILM_APART = 0.05
+"""How far the index of a named film may be from its law: 2 % of titanium dioxide's, and so of its thickness."""
 
 OPTICAL = ("eta", "kappa", "f0", "f82", "substrate_eta", "substrate_kappa")
 """Parameters that the refractive index determines: of the surface, or of what lies under a film."""
@@ -70,6 +75,48 @@ def of_material(name: str, material: str, channels: tuple[str, ...]) -> Known:
     return {name: known}
 
 
+def of_film(name: str, material: str, channels: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """What a named film holds of a model: film_eta and film_b, Cauchy's law closest to the literature's η, and κ.
+
+    Least squares at the channels' wavelengths, B ≥ 0; κ is their mean. How far that is from the literature is said.
+
+    Args:
+        name: Of a model with a film.
+        material: As in `fitmat.models.refractive_index.index`.
+        channels: Names of the channels, which are wavelengths.
+
+    Returns:
+        Parameter → value to hold; none of a model without a film.
+
+    Raises:
+        ModelError: the material is unknown, or its index follows no such law to `FILM_APART`.
+    """
+    films = [part for part in lobe_names(name) if LOBES[part].parts.get("fresnel") is Film]
+    if not films:
+        return {}
+    um = 1e-3 * channel_wavelengths(channels)
+    found = index(material, 1e3 * um)
+    basis = np.stack([np.ones_like(um), um**-2.0], axis=1)
+    a, b = np.linalg.lstsq(basis, np.real(found), rcond=None)[0] if len(um) > 1 else (0.0, -1.0)
+    if b < 0.0:
+        a, b = np.mean(np.real(found)), 0.0
+    kappa = float(np.mean(np.imag(found)))
+    apart = float(np.abs(a + b * um**-2.0 + 1j * kappa - found).max())
+    law = f"η = {a:.4g} + {b:.3g}/λ² (λ in µm), κ = {kappa:.2g}"
+    if apart > FILM_APART:
+        raise ModelError(
+            f"--film {material}: its index is {apart:.2g} from {law}, expected {FILM_APART:g} at most: a film's index "
+            "follows Cauchy's law here, its κ is one number. Leave out what it absorbs, or hold film_eta, film_b and "
+            "film_kappa by --fix."
+        )
+    warnings.warn(f"--film {material}: held {law}, off by {apart:.2g} at most.", ReadAs, stacklevel=2)
+    values = {"film_eta": a, "film_b": b, "film_kappa": kappa}
+    names = {e.name for e in entries(model(name))}
+    return {
+        key if key in names else f"{part}.{key}": np.array([value]) for part in films for key, value in values.items()
+    }
+
+
 def _say_what_rgb_cannot_hold(material: str, held: set[str]) -> None:
     """Warn with `ReadAs` of what becomes of the material's colour with three numbers a term."""
     way = "f82" if "f82" in held else "schlick" if "f0" in held else "closest"
@@ -105,17 +152,29 @@ def tilted(name: str, measurements: Measurements) -> Known:
     return {f"tilt{OVER}{name}": {axis: np.zeros(1) for axis, held in across.items() if held}}
 
 
-def prepare_known(names: list[str], measurements: Measurements, *, ior: str | None, tilt: bool) -> Known:
-    """The models of a study with what is known of the sample; models without a refractive index stay as they are.
+def prepare_known(
+    names: list[str], measurements: Measurements, *, ior: str | None, tilt: bool, film: str | None = None
+) -> Known:
+    """The models of a study with what is known of the sample; models without an index or a film stay as they are.
 
     Raises:
-        ModelError: as `of_material`, where no model has an index, and `tilted`.
+        ModelError: as `of_material`, where no model has an index, `of_film`, where none has a film, and `tilted`.
     """
     known: Known = {name: {} for name in names}
     if ior is not None:
         bearing = [n for n in names if any("fresnel" in LOBES[part].parts for part in lobe_names(n))]
         made = {n: of_material(n, ior, measurements.channels) for n in bearing or names}
         known = {new: held for n in names for new, held in made.get(n, {n: {}}).items()}
+    if film is not None:
+        made = {name: of_film(name, film, measurements.channels) for name in known}
+        refuse_no_film(film, made)
+        known = {name: held | made[name] for name, held in known.items()}
     if tilt:
         known = {new: held | more for n, held in known.items() for new, more in tilted(n, measurements).items()}
     return known
+
+
+def refuse_no_film(film: str, held: Known) -> None:
+    """Stop where a film is named and no model has one."""
+    if not any(held.values()):
+        raise ModelError(f"--film {film}: none of {', '.join(held)} has a film; use ggx-film or lambert+ggx-film.")

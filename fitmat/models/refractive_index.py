@@ -68,6 +68,10 @@ MATERIALS: dict[str, Material] = {
         "main/Al2O3/Malitson-o",
         "Sapphire, ordinary ray; I. H. Malitson & M. J. Dodge, J. Opt. Soc. Am. 62, 1405 (1972).",
     ),
+    "TiO2": Material(
+        "main/TiO2/Jolivet-amorphous",
+        "Titanium dioxide, amorphous film; A. Jolivet et al., Appl. Surf. Sci. 608 (2023).",
+    ),
     "diamond": Material("main/C/Peter", "Diamond; F. Peter, Z. Phys. 15, 358 (1923)."),
     "PMMA": Material(
         "organic/poly_methyl_methacrylate/Sultanova",
@@ -91,6 +95,9 @@ MATERIALS: dict[str, Material] = {
     "air": Material("other/air/Ciddor", "Standard air, 15 °C; P. E. Ciddor, Appl. Opt. 35, 1566 (1996)."),
 }
 """Short names, each with one dataset of refractiveindex.info (public domain, CC0); any other by shelf/book/page."""
+
+CLOSE = 0.7
+"""Share of letters in common from which a name may be meant for another: glod is gold, unobtainium no titanium."""
 
 EFFECTIVE_NM: dict[str, float] = {"r": 642.0, "g": 543.0, "b": 441.0, "value": 550.0}
 """Effective wavelengths of the channels of linear sRGB, and of a single unnamed channel; see `channel_wavelengths`."""
@@ -223,7 +230,7 @@ def _dataset(name: str) -> str:
     wanted = name.strip().lower()
     if wanted in folded:
         return MATERIALS[folded[wanted]].dataset
-    close = dict.fromkeys(folded[match] for match in difflib.get_close_matches(wanted, folded))
+    close = dict.fromkeys(folded[match] for match in difflib.get_close_matches(wanted, folded, cutoff=CLOSE))
     hint = f" Did you mean {' or '.join(close)}?" if close else ""
     raise ModelError(
         f"material {name!r} is not known.{hint} The names are {', '.join(MATERIALS)}; any other dataset of "

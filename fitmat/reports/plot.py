@@ -16,6 +16,7 @@ from fitmat.match.appearance.spheres import Perceived
 from fitmat.match.discernibility import SEPARATED, Telling
 from fitmat.reports.axes import BLACK, BLUE, FIT_COLOURS, MM, NARROW_MM, ORANGE, WIDTH_MM, new_figure, plain
 from fitmat.reports.axes import new_axes as new_axes
+from fitmat.reports.colour_plot import colours as colours
 from fitmat.reports.colour_plot import fresnel as fresnel
 from fitmat.reports.design_plot import design as design
 from fitmat.reports.drawn import channel_of, drawn_of, draws_of, match_of, sections, values_of

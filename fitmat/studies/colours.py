@@ -23,8 +23,29 @@ from fitmat.text import brief
 MOST_DRAWS = 1000
 """Of the posterior that are looked at, evenly spread: a quantile of 95 % is known to a hundredth part of them."""
 
+GREY = 1e-6
+"""Of a* and b*, below which rounding made them."""
+
 SURE = ("reliable", "corrected")
 """Verdicts on draws whose intervals hold; others are said."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Ellipse:
+    """Where 95 % of the draws are in the plane of a* and b*: centre + axes[0] cos t + axes[1] sin t.
+
+    It has the shape of their covariance and the size that holds 95 % of them; of a Gaussian posterior the size is
+    √χ²₂(0.95) = 2.448 standard deviations.
+
+    Attributes:
+        centre: Mean a* and b* of the draws, (2,).
+        axes: Semi-axes as vectors, the longer one first, (2, 2).
+    """
+
+    centre: Float[np.ndarray, "2"]
+    axes: Float[np.ndarray, "2 2"]
+
+    __repr__ = brief
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -39,6 +60,8 @@ class Colour:
         lab: CIE L*a*b* of it, (3,).
         lab_ci95: 95 % interval of each of these, (3, 2); NaN without draws.
         delta_e_95: ΔE2000 from the best fit within which 95 % of the draws are; NaN without draws.
+        ellipse: Where 95 % of the draws are in a* and b* together; None without draws, and of a grey.
+        draws: CIE L*a*b* of the draws, (m, 3).
         verdict: How far the draws can be trusted, a key of `uncertainty.posterior.VERDICTS`.
     """
 
@@ -49,6 +72,8 @@ class Colour:
     lab: Float[np.ndarray, "3"]
     lab_ci95: Float[np.ndarray, "3 2"]
     delta_e_95: float
+    ellipse: Ellipse | None
+    draws: Float[np.ndarray, "m 3"]
     verdict: str
 
     __repr__ = brief
@@ -60,18 +85,36 @@ class Colour:
         return "#" + "".join(f"{round(255 * float(x)):02x}" for x in shown)
 
     @property
+    def grey(self) -> bool:
+        """Whether it has a lightness and no hue whatever the values are, as of one channel."""
+        return not (np.abs(np.vstack([self.lab, self.draws])[:, 1:]) > GREY).any()
+
+    @property
     def sentence(self) -> str:
         """The colour, its interval, and what an eye sees of it."""
-        parts = zip(("L*", "a*", "b*"), self.lab, self.lab_ci95, strict=True)
+        parts = list(zip(("L*", "a*", "b*"), self.lab, self.lab_ci95, strict=True))[: 1 if self.grey else 3]
         if np.isnan(self.delta_e_95):
             numbers = ", ".join(f"{name} {x:.1f}" for name, x, _ in parts)
-            return f"{self.name} under {ILLUMINANTS[self.illuminant]}: {numbers}; no draws tell how sure that is."
+            return f"{self._seen}: {numbers}; no draws tell how sure that is."
         numbers = ", ".join(f"{name} {x:.1f} ({low:.1f} to {high:.1f})" for name, x, (low, high) in parts)
         unsure = "" if self.verdict in SURE else f" The draws are {self.verdict}: do not rely on it."
         return (
-            f"{self.name} under {ILLUMINANTS[self.illuminant]}: {numbers}. 95 % of what the data allow is within "
-            f"ΔE2000 = {self.delta_e_95:.2f} of it: {seen(self.delta_e_95)}.{unsure}"
+            f"{self._seen}: {numbers}. 95 % of what the data allow is within "
+            f"ΔE2000 = {self.delta_e_95:.2f} of it: {seen(self.delta_e_95)}.{self._together}{unsure}"
         )
+
+    @property
+    def _seen(self) -> str:
+        return f"{self.name} under {ILLUMINANTS[self.illuminant]}{', a grey' if self.grey else ''}"
+
+    @property
+    def _together(self) -> str:
+        """The ellipse in words."""
+        if self.ellipse is None:
+            return ""
+        long, short = np.hypot(*self.ellipse.axes.T)
+        towards = np.rad2deg(np.arctan2(*self.ellipse.axes[0, ::-1])) % 180.0
+        return f" a* and b* together: an ellipse of ±{long:.2g} by ±{short:.2g}, the longer towards hue {towards:.0f}°."
 
 
 def colour_of(
@@ -86,7 +129,7 @@ def colour_of(
 
     Args:
         fitted: A model of a run, `fitmat.load("run").fitted()`: of a spectrum that covers what an eye sees; of r, g, b
-            or x, y, z for D65 and the 2° observer.
+            or x, y, z for D65 and the 2° observer; of one channel, which is a grey.
         theta_i: Incidence in radians, 0 to π/2; 45° and 0° are the CIE's 45°:0°, without the highlight.
         theta_o: Direction of the eye in the plane of incidence, −π/2 to π/2, positive = mirror side.
         illuminant: D65, D50, A, FL2, FL11, LED-B3 or E.
@@ -111,11 +154,24 @@ def colour_of(
     xyz = np.pi * np.broadcast_to(values(model, every, wi, wo)[:, 0], (len(every), len(weights))) @ weights
     lit = white(illuminant, observer)
     labs = to_lab(xyz, lit)
-    interval, within = np.full((3, 2), np.nan), np.nan
+    interval, within, ellipse = np.full((3, 2), np.nan), np.nan, None
     if len(every) > 1:
         interval = np.quantile(labs[1:], [0.025, 0.975], axis=0).T
         within = float(np.quantile(delta_e_2000(xyz[1:], xyz[0], lit), 0.95))
-    return Colour(fitted.name, illuminant, observer, xyz[0], labs[0], interval, within, fitted.verdict)
+        ellipse = _ellipse(labs[1:, 1:])
+    told = (xyz[0], labs[0], interval, within, ellipse, labs[1:])
+    return Colour(fitted.name, illuminant, observer, *told, fitted.verdict)
+
+
+def _ellipse(ab: Float[np.ndarray, "m 2"]) -> Ellipse | None:
+    """Of the shape of the draws' covariance, as large as holds 95 % of them; None where they are a line."""
+    centre = ab.mean(axis=0)
+    variance, axes = np.linalg.eigh(np.cov(ab.T))
+    if not variance[0] > GREY**2:
+        return None
+    sd = np.sqrt(variance)
+    size = np.quantile(np.hypot(*((ab - centre) @ axes / sd).T), 0.95)
+    return Ellipse(centre, (size * sd * axes).T[::-1])
 
 
 def _draws(fitted: Fitted, best: Float[np.ndarray, "1 p"]) -> Float[np.ndarray, "m p"]:

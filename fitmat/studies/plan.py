@@ -79,6 +79,7 @@ def plan(
     ior: str | None = None,
     tilt: bool = False,
     dispersion: str | None = None,
+    film: str | None = None,
 ) -> Jobs:
     """What `fit` is to be told of each model.
 
@@ -92,6 +93,7 @@ def plan(
         ior: Material whose refractive index is held in the models that have one.
         tilt: Whether the sample's normal may lean.
         dispersion: Law of the refractive index in the models that have one.
+        film: Material whose index the film has in the models with a film.
 
     Raises:
         ModelError: a name is unknown, something given concerns no model, or two things given contradict each other.
@@ -99,7 +101,7 @@ def plan(
     names = model_names(asked, measurements)
     if dispersion is not None:
         names = _with_law(names, dispersion, ior)
-    prepared = known.prepare_known(names, measurements, ior=ior, tilt=tilt)
+    prepared = known.prepare_known(names, measurements, ior=ior, tilt=tilt, film=film)
     lawful = [name for name in prepared if dispersion is not None and carrying(name, dispersion)]
     having = {
         name: {e.name for e in entries(located(model(name), measurements.channels))} | _BESIDE for name in prepared

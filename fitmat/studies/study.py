@@ -120,6 +120,7 @@ def study(
     ior: str | None = None,
     tilt: bool = False,
     dispersion: str | None = None,
+    film: str | None = None,
     sampling: bool = True,
     seed: int = 0,
     second_opinion: bool = False,
@@ -141,6 +142,7 @@ def study(
         ior: Material whose refractive index is taken from the literature: "Au".
         tilt: Whether to fit how far the sample's normal leans.
         dispersion: Law that the refractive index follows over the channels' wavelengths, as in `fit`.
+        film: Material whose refractive index the film of `ggx-film` and others has: "TiO2".
         sampling: Whether to sample; else, and for more than `MOST_SAMPLED` values, Laplace's approximation.
         seed: Of everything that is drawn.
         second_opinion: Whether to sample every posterior a second time with another method.
@@ -165,7 +167,8 @@ def study(
     given = measurements if isinstance(measurements, Stream) else measurements_of(measurements)
     arguments.kind("models", models, str, Sequence)
     arguments.named(fixed=fixed, priors=priors)
-    for name, text in (("loss", loss), ("masking", masking), ("ior", ior), ("dispersion", dispersion)):
+    named = {"loss": loss, "masking": masking, "ior": ior, "dispersion": dispersion, "film": film}
+    for name, text in named.items():
         arguments.kind(name, text, str, optional=name != "loss")
     arguments.whole("seed", seed)
     arguments.flags(tilt=tilt, sampling=sampling, second_opinion=second_opinion, full=full, short=short)
@@ -178,7 +181,7 @@ def study(
     stream = as_stream(given)
     shown = stream if isinstance(stream, Measurements) else stream.part
     known = {"fixed": fixed, "priors": priors, "loss": loss, "masking": masking, "ior": ior, "tilt": tilt}
-    jobs = plan(models, shown, **known, dispersion=dispersion)
+    jobs = plan(models, shown, **known, dispersion=dispersion, film=film)
     if isinstance(stream, Measurements):
         first = laplace_each(stream, jobs, seed=seed, corrected=not sampling, progress=say)
     else:

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+import fitmat as fm
 from fitmat._types import Progress
 from fitmat.cli.main import main
 from fitmat.studies import sampling
@@ -173,6 +174,22 @@ BAD_ARGUMENTS: dict[str, tuple[tuple[str, ...], str]] = {
         "--theta-i '-5': expected angles from 0 to below",
     ),
     "not a number": (("simulate", "lambert", "--theta-i", "nan"), "--theta-i 'nan': expected angles from 0"),
+    "micrometres": (
+        ("simulate", "ggx", "--wavelengths", "0.4:0.7:0.1"),
+        "250 to 20000 nm, in rising order. Are they in",
+    ),
+    "wavelength twice": (("simulate", "ggx", "--wavelengths", "450,450"), "expected each wavelength once"),
+    "no wavelengths": (("simulate", "ggx", "--wavelengths", "blue"), "expected a list 450,550,650 or FIRST:LAST:STEP"),
+    "law of nothing": (("simulate", "ggx", "--dispersion", "drude"), "--dispersion drude without --wavelengths"),
+    "law and material": (
+        ("simulate", "ggx", "--dispersion", "drude", "--ior", "Au", "--wavelengths", "450,550"),
+        "--dispersion drude beside --ior or --film",
+    ),
+    "said by its material": (
+        ("simulate", "ggx", "--ior", "Au", "--set", "kappa=2", "--wavelengths", "450,550"),
+        "--set kappa beside --ior or --film, which say it already",
+    ),
+    "simulate no film": (("simulate", "ggx", "--film", "TiO2"), "none of ggx has a film; use ggx-film"),
     "simulate onto a folder": (("simulate", "lambert", "--out", "."), "already exists; give another name, or --force"),
     "simulate to nowhere": (("simulate", "lambert", "--out", "/proc/x.csv"), "cannot be written"),
 }
@@ -415,6 +432,28 @@ def test_simulate_and_fit_agree(run, tmp_path):
     # 51 samples of 2 %: kd to about 1 %, alpha to about 1 %; four standard deviations.
     assert parameters["kd"]["value"] == pytest.approx([0.4, 0.1, 0.2], rel=0.04)
     assert parameters["alpha"]["value"] == pytest.approx(0.3, rel=0.04)
+
+
+LINES = np.array([450.9, 548.6, 659.5])
+"""Of Johnson & Christy's table, nm."""
+
+
+@pytest.mark.parametrize(
+    ("told", "index"),
+    [
+        (("--ior", "Au"), np.array([1.38 + 1.914j, 0.43 + 2.455j, 0.14 + 3.697j])),
+        (("--dispersion", "cauchy", "--set", "cauchy_a=1.5", "--set", "cauchy_b=0.01"), 1.5 + 1e4 / LINES**2),
+    ],
+    ids=["named", "law"],
+)
+def test_simulated_spectra(run, tmp_path, told, index):
+    """Straight back F = |(n − 1)/(n + 1)|², D = 1/(π α²) and G2 = 1: F/(4 π α²); gold by Johnson & Christy's table."""
+    path = tmp_path / "spectrum.csv"
+    alone = ("--theta-i", "0", "--theta-o", "0", "--noise", 0, "--floor", 0, "--set", "alpha=0.5")
+    assert run("simulate", "ggx", *told, *alone, "--wavelengths", "450.9,548.6,659.5", "--out", path).code == 0
+    found = fm.read(path)
+    assert found.channels == ("450.9", "548.6", "659.5")
+    np.testing.assert_allclose(found.value[0], np.abs((index - 1) / (index + 1)) ** 2 / np.pi, rtol=1e-6)
 
 
 def test_simulated_catalogue(run, tmp_path):

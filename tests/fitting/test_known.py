@@ -5,7 +5,7 @@ import pytest
 
 import fitmat as fm
 from fitmat.errors import ModelError, ReadAs
-from fitmat.fitting.known import of_material, prepare_known, tilted
+from fitmat.fitting.known import of_film, of_material, prepare_known, tilted
 from fitmat.models.simulation import simulate
 
 JOHNSON_CHRISTY = 2e-2
@@ -93,3 +93,36 @@ def test_models_without_an_index_stay_as_they_are() -> None:
     assert set(known["tilt-over-lambert+ggx-conductor"]) == {"eta", "kappa", "tilt_y"}
     with pytest.raises(ModelError, match="no lobe with a refractive index"):
         prepare_known(["lambert"], _plane(0.0), ior="Au", tilt=False)
+
+
+SPECTRUM = ("400", "450", "500", "550", "600", "650", "700")
+
+
+def test_a_named_film_is_held_at_the_literature() -> None:
+    """Fused silica, 1.4585 at 587.6 nm (Malitson 1965), by Cauchy's law to 1e-4; κ 0; below it a metal."""
+    with pytest.warns(ReadAs, match=r"--film fused-silica: held η = 1\.448 \+ 0\.00351/λ².*, off by"):
+        held = of_film("lambert+ggx-film", "fused-silica", SPECTRUM)
+    assert held["film_eta"] + held["film_b"] / 0.5876**2 == pytest.approx(1.4585, abs=2e-4)
+    assert held["film_kappa"] == 0.0
+    assert of_film("lambert+ggx", "fused-silica", SPECTRUM) == {}
+
+
+def test_one_wavelength_of_a_film_has_no_dispersion() -> None:
+    """Fused silica at 546.07 nm: 1.4601 (Malitson 1965, table 1: 1.46008)."""
+    with pytest.warns(ReadAs, match="--film fused-silica"):
+        held = of_film("ggx-film", "fused-silica", ("546.07",))
+    assert (held["film_eta"], held["film_b"]) == (pytest.approx(1.46008, abs=2e-5), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "film", "words"),
+    [
+        ("ggx-film", "Au", r"--film Au: its index is .* from η = .*, expected 0\.05 at most"),
+        ("ggx-film", "Unobtainium", r"material 'Unobtainium' is not known\. The names"),
+        ("lambert+ggx", "TiO2", r"--film TiO2: none of lambert\+ggx has a film; use ggx-film"),
+    ],
+)
+def test_what_is_no_film_is_refused(name: str, film: str, words: str) -> None:
+    m = fm.from_arrays(0.5, [0.1, 0.2], np.ones((2, len(SPECTRUM))), channels=SPECTRUM)
+    with pytest.raises(ModelError, match=words):
+        prepare_known([name], m, ior=None, tilt=False, film=film)

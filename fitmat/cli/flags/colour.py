@@ -33,7 +33,12 @@ TableFlag = Annotated[
 
 ColourPlotFlag = Annotated[
     Path | None,
-    typer.Option(help="Draw colour and error by angle into this PNG, SVG or PDF.", metavar="FILE", show_default=False),
+    typer.Option(
+        help="Draw into this PNG, SVG or PDF: of a material colour and error by angle, of a run a*, b* and L* of its "
+        "models with what the data leave open.",
+        metavar="FILE",
+        show_default=False,
+    ),
 ]
 
 EnergyFlag = Annotated[

@@ -95,6 +95,16 @@ DispersionFlag = Annotated[
     ),
 ]
 
+FilmFlag = Annotated[
+    str | None,
+    typer.Option(
+        help="Material of a thin film, whose refractive index is fixed from the literature in models with one, as "
+        "ggx-film: TiO2, fused-silica, or shelf/book/page; --ior names what lies below it.",
+        metavar="NAME",
+        show_default=False,
+    ),
+]
+
 TiltFlag = Annotated[
     bool, typer.Option("--tilt", help="Fit how far the sample's normal leans in its mount, with every model.")
 ]

@@ -22,6 +22,45 @@ SetFlag = Annotated[
     ),
 ]
 
+WavelengthsFlag = Annotated[
+    str | None,
+    typer.Option(
+        help="Wavelengths of the channels in nm, FIRST:LAST:STEP or a list A,B,C: a spectrum. A parameter by channel "
+        "is then one number for all, or one for each.",
+        metavar="NM",
+        show_default=False,
+    ),
+]
+
+SimulatedLawFlag = Annotated[
+    str | None,
+    typer.Option(
+        help="Law of the refractive index over --wavelengths: cauchy, sellmeier, drude or drude-lorentz; its "
+        "parameters by --set, e.g. cauchy_a=1.48.",
+        metavar="LAW",
+        show_default=False,
+    ),
+]
+
+SimulatedIorFlag = Annotated[
+    str | None,
+    typer.Option(
+        help="Material whose refractive index the surface has, or what lies under its film: Au, N-BK7, PMMA, or "
+        "shelf/book/page.",
+        metavar="NAME",
+        show_default=False,
+    ),
+]
+
+SimulatedFilmFlag = Annotated[
+    str | None,
+    typer.Option(
+        help="Material whose refractive index the thin film of ggx-film and others has: TiO2, fused-silica, ….",
+        metavar="NAME",
+        show_default=False,
+    ),
+]
+
 ThetaIFlag = Annotated[str, typer.Option(help="Incidence angles in degrees, as --theta-o.", metavar="ANGLES")]
 
 ThetaOFlag = Annotated[
