@@ -30,7 +30,7 @@ def drawn(what: str, settings: Sequence[str], masking: str | None, lights: Seque
     if not Path(what).exists():
         if options["model"] is not None:
             raise ModelError(f"--model beside {what}, which is no run's folder, expected it with a run. Leave it out.")
-        return render(truth(what, settings, masking), **lit, **options)
+        return render(truth(what, settings, masking)[0], **lit, **options)
     for flag, given in (("--set", settings), ("--masking", masking)):
         if given:
             raise ModelError(f"{flag} beside the run {what}, which has its own values. Leave it out, or name a model.")
