@@ -5,23 +5,18 @@ It finds no optimum and names no outcome.
 
 from collections.abc import Callable
 
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Bool, Float
+from jaxtyping import Bool, Float
 
-from fitmat.fitting.channelwise import layout
 from fitmat.fitting.coordinates import Coordinates, coordinates
 from fitmat.fitting.left_blocks import of_few
-from fitmat.fitting.likelihood import Data, Prior, every_residual, misfits
+from fitmat.fitting.likelihood import Data, Prior, misfits
 from fitmat.fitting.priors import natural_sd
-from fitmat.maths.grams import Layout
-from fitmat.maths.least_squares import normal_equations
-from fitmat.maths.mapping import mapped
+from fitmat.fitting.settling import Frame, Walks, settle_of
 from fitmat.maths.normal import Z95
-from fitmat.maths.programs import program
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import entries, vector
-from fitmat.models.values import at, slices
+from fitmat.models.values import at
 
 UNDETERMINED = {"log": 1.0, "linear": 0.3}
 """A parameter whose standard deviation exceeds this (in ln p, or as a fraction of its range) is not determined."""
@@ -40,10 +35,6 @@ DIFFERENCE = 3e-4
 SIDES = (-1.0, 0.0, 1.0)
 """Where the slopes of such a difference are taken, in steps from its middle."""
 
-AT_ONCE = 16
-"""Points for which the program of `normal_equations_of` is compiled."""
-
-
 Equations = Callable[[Float[np.ndarray, "m p"]], tuple[np.ndarray, np.ndarray, np.ndarray]]
 """Natural coordinates of all parameters, (m, p), to Σ residual², (m,), Jᵀr, (m, p), and JᵀJ, (m, p, p)."""
 
@@ -56,43 +47,16 @@ def normal_equations_of(template: AbstractBRDF, data: Data, s: float) -> Equatio
         data: The samples.
         s: Discrepancy.
     """
-    every = coordinates(template)
-    of = layout(template, every, data.x.shape[1])
-    example = np.zeros((AT_ONCE, every.count))
-    run = _normal_equations.bound((template, every, of, data, np.asarray(float(s))), example, np.array(1))
+    size = coordinates(template).count
+    none, all_ = np.zeros(size), np.full(size, np.inf)
+    frame = Frame(none, -all_, all_, none + 1.0, np.eye(size), none > 0)
+    settle = settle_of(template, data, s, frame)
 
     def at(points: Float[np.ndarray, "m p"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        found = []
-        for part in slices(len(points), AT_ONCE):
-            size = part.stop - part.start
-            filled = example.copy()
-            filled[:size] = points[part]
-            found.append([np.asarray(one)[:size] for one in run(filled, np.array(size))])
-        square, slope, gram = (np.concatenate(one) for one in zip(*found, strict=True))
-        return square, slope, gram
+        found = settle(Walks.standing(points, np.zeros(len(points), int)), 1, 0)
+        return found.squares[:, 0], found.slope, found.gram
 
     return at
-
-
-@program
-def _normal_equations(
-    template: AbstractBRDF,
-    every: Coordinates,
-    of: Layout | None,
-    data: Data,
-    s: ArrayLike,
-    points: ArrayLike,
-    count: ArrayLike,
-) -> tuple[Array, Array, Array]:
-    base = vector(template)
-
-    def one(t: Array) -> tuple[Array, Array, Array]:
-        found = normal_equations(
-            lambda at: every_residual(every.model(template, base, at), data, jnp.asarray(s)), t, of
-        )
-        return found.square, found.slope, found.gram.dense()
-
-    return mapped(one, jnp.asarray(points), count)
 
 
 def expected_information(best: AbstractBRDF, data: Data, s: float) -> Float[np.ndarray, "p p"]:

@@ -4,6 +4,7 @@ This room knows nothing of reflection and fits nothing.
 """
 
 import dataclasses
+import functools
 from abc import abstractmethod
 from collections.abc import Container, Mapping, Sequence
 from typing import Any, Literal, TypeVar
@@ -140,7 +141,14 @@ def entries(model: eqx.Module) -> tuple[Entry, ...]:
 
     A name that two lobes share is written with its lobe: `phong.ks`, `ggx.ks`.
     """
-    found = _walk(model, "")
+    leaves, structure = jax.tree.flatten(model)
+    return _entries(structure, tuple(np.shape(leaf) for leaf in leaves))
+
+
+@functools.lru_cache(maxsize=256)
+def _entries(structure: Any, shapes: tuple[tuple[int, ...], ...]) -> tuple[Entry, ...]:
+    """Of any model of this structure and these shapes."""
+    found = _walk(jax.tree.unflatten(structure, [np.ones(shape) for shape in shapes]), "")
     names = [name for _, name, _, _ in found]
     result, start = [], 0
     for owner, name, meta, shape in found:

@@ -19,7 +19,7 @@ import pytest
 from jaxtyping import Array
 
 import fitmat as fm
-from fitmat.fitting import information
+from fitmat.fitting import settling
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.likelihood import prepare
 from fitmat.maths import program_files, program_names, programs
@@ -149,7 +149,7 @@ def test_a_later_process_traces_none(filled: tuple[Path, list[Run]], package: Pa
     later = ended(started(place, package))
     assert later.found == first.found
     assert later.formula == 0
-    assert {"refine", "block", "normal_equations"} <= kinds(first.traced)
+    assert {"refine", "block", "settled"} <= kinds(first.traced)
     assert sorted(later.traced) == sorted(path.stem for path in place.glob(f"*{SUFFIX}"))
     assert (later.hits, later.misses) == (len(later.traced), 0)
     assert later.warned == ""
@@ -269,16 +269,21 @@ def test_within_another_program_it_is_the_function(given: Arguments, traced: lis
 def test_tuples_and_static_coordinates(place: Path, traced: list[str]) -> None:
     """Σ r², Jᵀr and JᵀJ in the coordinates of all parameters, then of some; each choice is a program of its own."""
     m, model = fm.read(DATA), fm.model(FITTED)
-    data, s, count = prepare(m, measured_noise(m)), np.array(0.01), np.array(2)
-    function = inspect.unwrap(information._normal_equations)
+    data, s, counts = prepare(m, measured_noise(m)), np.array(0.01), np.array([2, 1, 0])
+    function = inspect.unwrap(settling._settled)
     for moved in (coordinates(model), coordinates(model, {"kd": 0.3})):
-        lower, upper = moved.low, moved.high
+        lower, upper, p = moved.low, moved.high, moved.count
         points = lower + np.array([[0.3], [0.6]]) * (upper - lower)
-        found = Program(function)(model, moved, None, data, s, points, count)
-        expected: Any = function(model, moved, None, data, s, points, count)
+        frame = settling.Frame(0.0 * lower, lower, upper, upper - lower, np.eye(p), np.ones(p, bool))
+        walks = settling._packed(settling.Walks.standing(points, np.zeros(2, int)), slice(0, 2))
+        given = model, moved, None, data, s, frame, walks, counts
+        found = Program(function)(*given)
+        expected: Any = function(*given)
         assert isinstance(found, tuple)
-        for part, wanted, shape in zip(found, expected, [(), (moved.count,), (moved.count,) * 2], strict=True):
-            assert part.shape == (2, *shape)
+        for part, wanted, shape in zip(
+            found, expected, [(settling.STEPS, p), (settling.STEPS,), (p,), (p, p)], strict=True
+        ):
+            assert part.shape == (settling.AT_ONCE, *shape)
             np.testing.assert_allclose(part, wanted, rtol=SUMS, atol=SUMS * np.abs(wanted).max())
     assert len(set(traced)) == 2
     moved = coordinates(model)

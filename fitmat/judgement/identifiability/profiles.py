@@ -10,33 +10,16 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.fitting.coordinates import coordinates
-from fitmat.fitting.information import inverse_information, normal_equations_of
+from fitmat.fitting.information import inverse_information
 from fitmat.fitting.likelihood import Data
 from fitmat.fitting.result import Fit
+from fitmat.fitting.settling import FARTHEST, MOST_ITERATIONS, STEPS, Frame, Reached, Walks, settle_of
 from fitmat.maths.normal import Z95
 from fitmat.models.values import at
 from fitmat.text import brief
 
-STEPS = 16
-"""Points on either side of the best value."""
-
-FARTHEST = 4.0
-"""Where a side ends unless a bound comes first, as √(2Δ): four standard deviations of a Gaussian."""
-
-LONGEST = 0.1
-"""Longest step, as a fraction of the range of whatever parameter moves most: 16 of them cross any range."""
-
-GROWTH = 3.0
-"""A step is at most so many times as long as the last one, and at least as much shorter."""
-
 LEVEL = Z95
 """√(2Δ) at the ends of a 95 % interval: 2Δ follows χ² with one degree of freedom (Wilks 1938)."""
-
-PRECISE = 1e-5
-"""Inner optima end where Δ would fall by less."""
-
-MOST_ITERATIONS = 40
-"""Of the inner optima."""
 
 ROWS = 4096
 """Of more rows an evenly spread part stands for all, with values that the best model predicts exactly."""
@@ -49,13 +32,11 @@ class Points(NamedTuple):
         at: Values of the parameter that is held, natural (logarithm where the scale is log), (m,).
         rise: Δ = ln L(best) − ln L(point), (m,), priors included.
         coordinates: The free parameters at each point, natural, (m, f).
-        information: JᵀJ there, natural, (m, f, f).
     """
 
     at: np.ndarray
     rise: np.ndarray
     coordinates: np.ndarray
-    information: np.ndarray
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -107,32 +88,12 @@ def profiles(fit: Fit, *, widened: bool = True) -> tuple[Profile, ...]:
     if not len(fit.free) or not fit.finite:
         return ()
     moved, surface = fit.coordinates, _Surface(fit, widened)
-    low, high, span, best = surface.low, surface.high, moved.span, surface.best
-    held = np.repeat(np.arange(moved.count), 2)
-    sign, each = np.tile([-1.0, 1.0], moved.count), np.arange(2 * moved.count)
-    known = surface.gram
-    unit = np.minimum(np.sqrt(np.diagonal(inverse_information(known, span))), span)[held]
-    tangent = _tangents(np.broadcast_to(known, (len(held), *known.shape)), held, span)
-    reach = np.where(sign > 0, (high - best)[held], (best - low)[held])
-    t = np.tile(best, (len(held), 1))
-    offset, last, root = np.zeros(len(held)), unit * FARTHEST / STEPS, np.zeros(len(held))
-    found = []
-    for target in np.linspace(0.0, FARTHEST, STEPS + 1)[1:]:
-        longest = LONGEST / np.max(np.abs(tangent) / span, axis=1)
-        ahead, last = _ahead(offset, last, root, target, longest)
-        ahead = np.minimum(ahead, reach)
-        t = np.clip(t + tangent * (sign * (ahead - offset))[:, None], low, high)
-        t[each, held] = best[held] + sign * ahead
-        offset = ahead
-        points = surface.settled(t, held)
-        t, root = points.coordinates, np.sqrt(2.0 * np.maximum(points.rise, 0.0))
-        tangent = _tangents(points.information, held, span)
-        found.append(points)
-    sides = Points(*(np.stack(part, axis=1) for part in zip(*found, strict=True)))
-    here = Points(best, np.zeros(()), best, known)
+    low, high, best = surface.low, surface.high, surface.best
+    held, sign = np.repeat(np.arange(moved.count), 2), np.tile([-1.0, 1.0], moved.count)
+    sides, here = surface.walked(held, sign), Points(best, np.zeros(()), best)
     result = []
     for k, name in enumerate(moved.names):
-        parts = zip(sides, (best[k], *here[1:]), strict=True)
+        parts = zip(sides, here._replace(at=best[k]), strict=True)
         points = Points(*(np.concatenate([a[2 * k][::-1], [centre], a[2 * k + 1]]) for a, centre in parts))
         limits, opened = _interval(points.at, points.rise, STEPS, (low[k], high[k]))
         result.append(Profile(name, k, points, limits, opened))
@@ -141,8 +102,8 @@ def profiles(fit: Fit, *, widened: bool = True) -> tuple[Profile, ...]:
 
 def along(
     fit: Fit, place: int, held: Float[np.ndarray, " m"], guess: Float[np.ndarray, "m f"], *, widened: bool = True
-) -> Points:
-    """The profile of one parameter at given natural values.
+) -> tuple[Points, Float[np.ndarray, "m f f"]]:
+    """The profile of one parameter at given natural values, and JᵀJ there, natural.
 
     Args:
         fit: As for `profiles`.
@@ -163,69 +124,54 @@ class _Surface:
         best: The fit's own, kept within the bounds, (f,).
         low: Bounds as seen from there, (f,).
         high: The others.
-        span: Widths of the bounds, (f,).
-        gram: JᵀJ there, (f, f).
     """
 
     def __init__(self, fit: Fit, widened: bool) -> None:
-        moved, every = fit.coordinates, coordinates(fit.model)
-        self.best, self.span = np.clip(moved.natural(fit.values), moved.low, moved.high), moved.span
+        moved, every, part = fit.coordinates, coordinates(fit.model), representative(fit)
+        self.best, self._span = np.clip(moved.natural(fit.values), moved.low, moved.high), moved.span
         self.low, self.high = moved.around(self.best)
-        self._natural, self._free = every.natural(fit.values), fit.free
-        self._equations = normal_equations_of(fit.model, representative(fit), fit.discrepancy)
-        self._back = np.linalg.inv(fit.correlation.stretch) if widened else np.eye(moved.count)
-        square, _, gram = self._at(self.best[None])
-        self._square, self.gram = square[0], gram[0]
+        self._free, self._centre = fit.free, every.natural(fit.values)
+        self._centre[self._free] = self.best
+        self._inside, back = np.ix_(self._free, self._free), np.eye(every.count)
+        if widened:
+            back[self._inside] = np.linalg.inv(fit.correlation.stretch)
+        free = self._every(np.ones(moved.count), 0.0) > 0
+        low, high, span = self._every(self.low, -np.inf), self._every(self.high, np.inf), self._every(self._span, 1.0)
+        frame = Frame(self._centre, low, high, span, back, free)
+        self._settle = settle_of(fit.model, part, fit.discrepancy, frame)
+        here = self._settle(Walks.standing(self._centre[None], self._free[:1]), 1, 0)
+        self._least, self._gram = here.squares[0, 0], here.gram[0][self._inside]
 
-    def _at(self, t: Float[np.ndarray, "m f"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        t = np.clip(self.best + (t - self.best) @ self._back.T, self.low, self.high)
-        natural, free = np.tile(self._natural, (len(t), 1)), self._free
-        natural[:, free] = t
-        square, slope, gram = self._equations(natural)
-        return square, slope[:, free] @ self._back, self._back.T @ gram[:, free[:, None], free] @ self._back
+    def _every(self, chosen: Float[np.ndarray, "... f"], other: float | np.ndarray) -> Float[np.ndarray, "... p"]:
+        """Of all parameters, those that are fixed with another value."""
+        found = np.empty((*chosen.shape[:-1], len(self._centre)))
+        found[...] = other
+        found[..., self._free] = chosen
+        return found
 
-    def settled(self, t: Float[np.ndarray, "m f"], held: np.ndarray) -> Points:
-        """The optima of the other parameters from t on, with one parameter of each point held; kept in the bounds.
+    def walked(self, held: np.ndarray, sign: np.ndarray) -> Points:
+        """Walks from the best fit, along one parameter each, (m, `STEPS`)."""
+        unit = np.sqrt(np.diagonal(inverse_information(self._gram, self._span)))
+        first = np.minimum(unit, self._span)[held] * FARTHEST / STEPS
+        released = np.linalg.inv(self._gram + np.diag(12.0 / self._span**2))[held]
+        tangent = released / np.take_along_axis(released, held[:, None], axis=1)
+        reach = np.where(sign > 0, (self.high - self.best)[held], (self.best - self.low)[held])
+        start = np.tile(self._centre, (len(held), 1))
+        least = np.full(len(held), self._least)
+        walks = Walks(start, self._free[held], sign, reach, first, least, self._every(tangent, 0.0))
+        return self._points(self._settle(walks, STEPS, MOST_ITERATIONS), held)
 
-        Levenberg–Marquardt for all points together, projected onto the bounds (Bertsekas 1982).
-        """
-        each, span = np.arange(len(t)), self.span
-        low, high = self.low, self.high
-        square, slope, gram = self._at(t)
-        damping, moving = np.full(len(t), 1e-6), np.ones(len(t), bool)
-        for _ in range(MOST_ITERATIONS):
-            blocked = ((t <= low) & (slope > 0)) | ((t >= high) & (slope < 0))
-            blocked[each, held] = True
-            step, promised = _steps(slope, gram, blocked, damping, span)
-            moving &= promised > PRECISE
-            which = np.flatnonzero(moving)
-            if len(which) == 0:
-                break
-            tried = np.clip(t[which] + step[which], low, high)
-            found = self._at(tried)
-            better = found[0] <= square[which]
-            damping[which] = np.where(better, damping[which] * 0.1, np.maximum(damping[which] * 10.0, 1e-3))
-            moving[which[damping[which] > 1e6]] = False
-            taken = which[better]
-            t = t.copy()
-            t[taken], square[taken] = tried[better], found[0][better]
-            slope[taken], gram[taken] = found[1][better], found[2][better]
-        return Points(t[each, held], 0.5 * (square - self._square), t, gram)
+    def settled(self, t: Float[np.ndarray, "m f"], held: np.ndarray) -> tuple[Points, Float[np.ndarray, "m f f"]]:
+        """The optima of the other parameters from t on, with one of each point held, and the information there."""
+        walks = Walks.standing(self._every(t, self._centre), self._free[held])
+        found = self._settle(walks, 1, MOST_ITERATIONS)
+        points = Points(*(part[:, 0] for part in self._points(found, held)))
+        return points, found.gram[:, self._free[:, None], self._free]
 
-
-def _steps(
-    slope: np.ndarray, gram: np.ndarray, blocked: np.ndarray, damping: np.ndarray, span: np.ndarray
-) -> tuple[Float[np.ndarray, "m f"], Float[np.ndarray, " m"]]:
-    """Damped Gauss–Newton steps of the parameters that are not blocked, and how far ½ Σ residual² falls by them."""
-    free = ~blocked
-    unit = np.sqrt(np.maximum(np.diagonal(gram, axis1=1, axis2=2), 1e-12 / span**2))
-    scaled = np.where(free[:, :, None] & free[:, None, :], gram / (unit[:, :, None] * unit[:, None, :]), 0.0)
-    eye = np.eye(slope.shape[1])
-    system = scaled + eye * (np.where(free, damping[:, None], 1.0)[:, :, None] + 1e-14)
-    against = np.where(free, -slope / unit, 0.0)
-    z = np.linalg.solve(system, against[..., None])[..., 0]
-    promised = np.einsum("mi,mi->m", against, z) - 0.5 * np.einsum("mi,mij,mj->m", z, scaled, z)
-    return z / unit, promised
+    def _points(self, found: Reached, held: np.ndarray) -> Points:
+        natural = found.points[..., self._free]
+        at = np.take_along_axis(natural, held[:, None, None], axis=2)[..., 0]
+        return Points(at, 0.5 * (found.squares - self._least), natural)
 
 
 def representative(fit: Fit) -> Data:
@@ -240,23 +186,6 @@ def representative(fit: Fit) -> Data:
     part = fit.data.every(stride)
     exact = at(fit.model, part.wi, part.wo) * part.kappa
     return dataclasses.replace(part, x=exact, weight=part.weight * np.sqrt(stride))
-
-
-def _ahead(
-    offset: np.ndarray, last: np.ndarray, root: np.ndarray, target: float, longest: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """The next distance from the best value, and the step to it, for √(2Δ) = target if that grows as before."""
-    growing = root > 0
-    wanted = np.where(growing, offset * (target / np.where(growing, root, 1.0) - 1.0), GROWTH * last)
-    step = np.minimum(np.clip(wanted, last / GROWTH, last * GROWTH), longest)
-    return offset + step, step
-
-
-def _tangents(known: Float[np.ndarray, "m f f"], held: np.ndarray, span: np.ndarray) -> Float[np.ndarray, "m f"]:
-    """dt/dt_k along the ridge: the others follow so that the residuals change least."""
-    released = np.linalg.inv(known + np.diag(12.0 / span**2))
-    column = np.take_along_axis(released, held[:, None, None], axis=2)[..., 0]
-    return column / np.take_along_axis(column, held[:, None], axis=1)
 
 
 def _interval(

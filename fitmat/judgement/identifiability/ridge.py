@@ -12,7 +12,8 @@ from jaxtyping import Float
 
 from fitmat.fitting.priors import natural_sd
 from fitmat.fitting.result import Fit
-from fitmat.judgement.identifiability.profiles import STEPS, Profile, along
+from fitmat.fitting.settling import STEPS
+from fitmat.judgement.identifiability.profiles import Profile, along
 from fitmat.text import brief
 
 NODES = 4 * STEPS
@@ -93,16 +94,16 @@ def ridge(fit: Fit, profiled: tuple[Profile, ...], *, widened: bool = True) -> R
     filling = np.array([p.sd for p in profiled]) / prior
     place = int(np.argmax(filling))
     held, guess = _spaced(profiled, filling, place, prior)
-    points = along(fit, place, held, guess, widened=widened)
+    points, information = along(fit, place, held, guess, widened=widened)
     others = np.delete(np.arange(len(prior)), place)
-    stiff = points.information[:, others][:, :, others] + np.diag(prior[others] ** -2.0)
+    stiff = information[:, others][:, :, others] + np.diag(prior[others] ** -2.0)
     width = np.gradient(held) if len(held) > 1 else np.ones(1)
     logs = -points.rise - 0.5 * np.linalg.slogdet(stiff)[1] + np.log(np.maximum(width, 1e-300))
     weight = np.exp(logs - logs.max())
-    across, free = np.zeros_like(points.information), np.linalg.inv(stiff)
+    across, free = np.zeros_like(information), np.linalg.inv(stiff)
     across[:, others[:, None], others] = free
     slopes = np.ones((len(held), len(prior)))
-    slopes[:, others] = -np.einsum("eij,ej->ei", free, points.information[:, others, place])
+    slopes[:, others] = -np.einsum("eij,ej->ei", free, information[:, others, place])
     along_it = slopes * width[:, None] / np.sqrt(12.0)
     return Ridge(fit, place, weight / weight.sum(), points.coordinates, across, along_it)
 
