@@ -24,6 +24,7 @@ from fitmat.measurements.noise import Noise
 from fitmat.measurements.samples import Measurements
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import Entry, entries, vector
+from fitmat.models.values import at
 from fitmat.text import brief, html_table, text_table, with_error
 
 
@@ -95,6 +96,11 @@ class Fit:
     def free(self) -> np.ndarray:
         """Indices of the parameters that were fitted."""
         return self.coordinates.index
+
+    @functools.cached_property
+    def predicted(self) -> Float[np.ndarray, "n c"]:
+        """f cosθ_i of the best fit, rows as in `data`."""
+        return at(self.model, self.data.wi, self.data.wo) * self.data.kappa
 
     @functools.cached_property
     def linear(self) -> Linear | None:

@@ -81,7 +81,7 @@ def standardised_residuals(fit: Fit, *, misfit: bool = True) -> Float[np.ndarray
     """
     data = fit.data.under(DEFAULT)
     s = np.asarray(fit.misfit if misfit else 0.0)
-    return misfits(at(fit.model, data.wi, data.wo) * data.kappa, data.noise, data, s)
+    return misfits(fit.predicted, data.noise, data, s)
 
 
 def predictive_band(posterior: Posterior, rows: np.ndarray) -> Float[np.ndarray, "2 k c"]:

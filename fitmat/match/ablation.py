@@ -24,9 +24,9 @@ from fitmat.models.lobes.microfacet import Microfacet
 from fitmat.models.lobes.walter import Walter
 from fitmat.models.terms.distributions import AbstractDistribution, Beckmann, Slopes
 from fitmat.models.terms.fresnel import AbstractFresnel
-from fitmat.models.values import Draws, blocks, surfaces, widths
+from fitmat.models.values import Draws, blocks, channel_mean, surfaces, widths
 from fitmat.text import brief
-from fitmat.uncertainty.estimate import Estimate, band, estimate
+from fitmat.uncertainty.estimate import Estimate, band, estimates
 
 TERMS = {
     "fresnel": "no Fresnel term",
@@ -228,7 +228,7 @@ def ablate(
 
     def over(part: np.ndarray) -> dict[str, Estimate]:
         found = falls((light * part)[:, None])[..., 0] if part.any() else np.zeros((len(squares), 0))
-        return {term: estimate(found[:, k]) for k, term in enumerate(TERMS) if part.any()}
+        return dict(zip(TERMS, estimates(found), strict=True)) if part.any() else {}
 
     each = falls(np.eye(len(theta_i)))
     light, far = np.cos(theta_i) * np.sin(theta_i), np.deg2rad(GRAZING_DEG) < theta_i
@@ -255,7 +255,7 @@ def _squares(
     for rows, k, (f, whole, without) in blocks(parts, [(rule.wi, rule.wo) for rule in rules]):
         place, share = k // turns, rules[k].weight / turns
         without = without.reshape(*without.shape[:2], len(TERMS), -1)
-        apart = ((f[:, :, None] - np.concatenate([whole[:, :, None], without], axis=2)) ** 2).mean(axis=3)
+        apart = channel_mean((f[:, :, None] - np.concatenate([whole[:, :, None], without], axis=2)) ** 2)
         squares[rows, :, place] += np.einsum("dmt,m->dt", apart, share)
-        norm[rows, place] += (whole**2).mean(axis=2) @ share
+        norm[rows, place] += channel_mean(whole**2) @ share
     return squares, norm

@@ -15,9 +15,9 @@ from fitmat.maths.arrays import library
 from fitmat.maths.quadrature import AZIMUTH_NODES, ZENITH_NODES, Rule, lobe_rules
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.metrics import METRICS, NGAN_DEG, Metric
-from fitmat.models.values import Draws, blocks, surfaces, widths
+from fitmat.models.values import Draws, blocks, channel_mean, surfaces, widths
 from fitmat.text import brief
-from fitmat.uncertainty.estimate import Estimate, band, estimate
+from fitmat.uncertainty.estimate import Estimate, band, estimate, estimates
 
 COARSE = (24, 12)
 """Nodes behind the spread of the draws; the best fits are integrated with all nodes."""
@@ -109,8 +109,8 @@ def measure_distances(
         spread, shares = _over_nodes(metric, t, b), t / np.maximum(t.sum(axis=1, keepdims=True), 1e-300)
         result["draws"][name] = _over_nodes(metric, t.sum(axis=1), b.sum(axis=1))
         result["whole"][name] = estimate(result["draws"][name])
-        result["by_region"][name] = {region: estimate(spread[:, r]) for r, region in enumerate(REGIONS)}
-        result["share"][name] = {region: estimate(shares[:, r]) for r, region in enumerate(REGIONS)}
+        result["by_region"][name] = dict(zip(REGIONS, estimates(spread), strict=True))
+        result["share"][name] = dict(zip(REGIONS, estimates(shares), strict=True))
         t, b = top[:, curves, k], bottom[:, curves, k]
         result["by_incidence"][name] = band(_at_node(metric, t.sum(axis=2), b.sum(axis=2), ANGLES))
         result["both"][name] = band(_at_node(metric, t, b, ANGLES[:, None]))
@@ -232,7 +232,7 @@ def _integrals(
         t, b = _terms(rules[k], weights[k], found, metrics)
         top[rows, place] += t.transpose(1, 0, 2) / turns
         bottom[rows, place] += b.transpose(1, 0, 2) / turns
-        albedos[rows, place] += np.stack([f.mean(axis=2) @ rules[k].weight for f in found], axis=1) / turns
+        albedos[rows, place] += np.stack([channel_mean(f) @ rules[k].weight for f in found], axis=1) / turns
     return top, bottom, albedos
 
 
@@ -251,7 +251,7 @@ def _terms(
     """T and V, or ∫ f₂² w, of every metric by region, channel means."""
     (one, two), ci, co, flat = pair, rule.wi[2], rule.wo[:, 2:], weights.reshape(len(weights), -1)
 
-    def summed(term: Float[np.ndarray, "d m c"]) -> Float[np.ndarray, "w d r"]:
+    def summed(term: np.ndarray) -> np.ndarray:
         found = sum(term[:, :, channel] @ flat for channel in range(term.shape[2])) / term.shape[2]
         return np.asarray(found).reshape(len(term), *weights.shape[1:]).transpose(1, 0, 2)
 

@@ -7,6 +7,7 @@ sources, versions, machine. The folder is the business of `program_files`. No fo
 import contextlib
 import functools
 import hashlib
+import itertools
 import os
 import re
 import threading
@@ -26,6 +27,9 @@ LAST = "last-{}"
 
 MOST_AHEAD = 16
 """Programs that are loaded ahead."""
+
+OFTEN = 32
+"""Calls of one program that are worth moving what they share to the device, which takes as long as passing it to 12."""
 
 defects.mend()  # before anything is compiled
 
@@ -76,14 +80,21 @@ class Program:
         """The program with its first arguments in place, for a loop: a call of it takes the arrays that are left.
 
         Args:
-            fixed: First arguments; their arrays are moved to the device once.
+            fixed: First arguments; of a loop of `OFTEN` calls their arrays are moved to the device, once.
             free: Examples of the others, which give shape and type.
         """
         leaves, structure = jax.tree.flatten(((*fixed, *free), {}))
         arrays = [leaf for leaf in leaves if isinstance(leaf, program_names.ARRAYS)]
         run = self._found(leaves, structure, arrays, ((*fixed, *free), {}))
-        kept = jax.device_put(arrays[: len(arrays) - len(free)])
-        return lambda *given: run(*kept, *given)
+        kept, calls = arrays[: len(arrays) - len(free)], itertools.count(1)
+
+        def call(*given: Any) -> Any:
+            nonlocal kept
+            if next(calls) == OFTEN:
+                kept = jax.device_put(kept)
+            return run(*kept, *given)
+
+        return call
 
     def clear(self) -> None:
         """Let go of what is loaded; what is kept on disk stays."""

@@ -164,16 +164,16 @@ def _same_at(m: Measurements, top: float) -> bool:
 
 def beside(m: Measurements, azimuth: float) -> tuple[float, ...]:
     """The same where they peak at the mirror angle, but at another relative azimuth, in degrees."""
-    if _mirrored(m):
+    if any(_mirrored(m)):
         return ()
     turn = np.deg2rad(180.0 - azimuth)
     c, s = np.cos(turn), np.sin(turn)
-    return _mirrored(dataclasses.replace(m, wo=m.wo @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])))
+    return tuple(_mirrored(dataclasses.replace(m, wo=m.wo @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))))
 
 
-def _mirrored(m: Measurements) -> tuple[float, ...]:
+def _mirrored(m: Measurements) -> Iterator[float]:
     """Incidences in degrees whose curves peak in the mirror direction."""
-    return tuple(np.rad2deg(at) for at, angle, value in _in_plane(m) if _peaks(angle, value, at, min(NEAR, 0.75 * at)))
+    return (np.rad2deg(at) for at, angle, value in _in_plane(m) if _peaks(angle, value, at, min(NEAR, 0.75 * at)))
 
 
 def _peaking(m: Measurements, where: Callable[[float], float]) -> tuple[float, ...]:
@@ -218,6 +218,8 @@ def _peaks(angle: np.ndarray, value: np.ndarray, at: float, within: float) -> bo
         return False
     top = near[value[near].argmax()]
     apart, height = angle - angle[top], value[top]
+    if height < value[np.abs(apart) < TOP].max():
+        return False
     sides = [value[(side * apart > 0) & (side * apart < BESIDE)] for side in (-1.0, 1.0)]
     middle = float(np.median(np.interp(np.linspace(angle[0], angle[-1], 181), angle, value)))
     # Of three neighbours f, g, h the scatter of f − 2g + h is √6 times the noise.
@@ -227,6 +229,5 @@ def _peaks(angle: np.ndarray, value: np.ndarray, at: float, within: float) -> bo
     low = height * min(FALLS, 1.0 / (1.0 + CLEAR * relative))
     return bool(
         all(side.size and np.quantile(side, 0.25) < low for side in sides)
-        and height >= value[np.abs(apart) < TOP].max()
         and height > max(STANDS_OUT * middle, middle + CLEAR * floor)
     )

@@ -54,9 +54,9 @@ def values(
     """
     most = LARGE if len(wi) >= LARGE[1] // 2 else SMALL
     found = None
-    for rows in slices(len(draws), most[0]):
-        for places in slices(len(wi), most[1]):
-            light, sensor = (_filled(w[places], most[1]) for w in (wi, wo))
+    for places in slices(len(wi), most[1]):
+        light, sensor = (_filled(w[places], most[1]) for w in (wi, wo))
+        for rows in slices(len(draws), most[0]):
             block, _ = _block(model, _filled(draws[rows], most[0]), light, sensor, np.array(rows.stop - rows.start))
             if found is None:
                 found = np.empty((len(draws), len(wi), block.shape[2]))
@@ -89,6 +89,11 @@ def blocks(
             found = [values(model, draws[rows], wi, wo) for model, draws in parts]
             for k in range(some.stop - some.start):
                 yield rows, some.start + k, [f[:, k * count : (k + 1) * count] for f in found]
+
+
+def channel_mean(f: np.ndarray) -> np.ndarray:
+    """Mean over the last axis, which takes as long as all else where it is of one channel and not seen to be."""
+    return f[..., 0] if f.shape[-1] == 1 else f.mean(axis=-1)
 
 
 def widths(model: AbstractBRDF, draws: Float[np.ndarray, "d p"]) -> Float[np.ndarray, " d"]:

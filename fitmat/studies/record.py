@@ -4,8 +4,9 @@ It computes nothing; numbers that are not finite become null.
 """
 
 import dataclasses
+import functools
 import platform
-from importlib.metadata import version
+from importlib.metadata import version as installed
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,9 @@ from fitmat.studies.findings import Findings
 from fitmat.studies.result import FORMAT, masking
 from fitmat.studies.study import Study
 from fitmat.text import plain
+
+version = functools.cache(installed)
+# Files of a batch ask for the same few.
 
 
 def to_dict(study: Study, command: str | None = None, *, short: bool = False) -> dict[str, Any]:

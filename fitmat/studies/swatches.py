@@ -4,6 +4,7 @@ It judges no colour; `match.appearance` does.
 """
 
 import base64
+import functools
 import struct
 import zlib
 from typing import Any
@@ -33,6 +34,20 @@ _MAGMA = np.array([[0, 0, 4], [59, 15, 112], [140, 41, 129], [222, 73, 104], [25
 
 def swatch(model: AbstractBRDF, channels: tuple[str, ...]) -> str:
     """A sphere of the material in one light; where it faces the light, a white diffuser would be white."""
+    inside, edge, lit, wi, wo = _sphere()
+    weights = colouring(channels).weights
+    f = at(surface(model), wi, wo)
+    xyz = np.zeros((len(lit), 3))
+    xyz[lit] = np.pi * wi[:, 2:] * (np.broadcast_to(f, (len(f), len(weights))) @ weights)
+    picture = np.zeros((SIZE, SIZE, 4), np.uint8)
+    picture[inside, :3] = np.round(255.0 * to_srgb(np.nan_to_num(xyz)))
+    picture[..., 3] = np.round(255.0 * edge)
+    return png(picture)
+
+
+@functools.cache
+def _sphere() -> tuple[np.ndarray, ...]:
+    """Which pixels see the sphere, how much of each, which of those are lit, and the directions there."""
     axis = (np.arange(SIZE) + 0.5) * 2.0 / SIZE - 1.0
     x, y = np.meshgrid(axis, -axis)
     inside = x**2 + y**2 < 1.0
@@ -41,14 +56,7 @@ def swatch(model: AbstractBRDF, channels: tuple[str, ...]) -> str:
     light = TOWARDS / np.linalg.norm(TOWARDS)
     lit = n @ light > 1e-3
     wi, wo = (_local(n[lit], np.broadcast_to(w, n[lit].shape)) for w in (light, np.array([0.0, 0.0, 1.0])))
-    weights = colouring(channels).weights
-    f = at(surface(model), wi, wo)
-    xyz = np.zeros((len(n), 3))
-    xyz[lit] = np.pi * wi[:, 2:] * (np.broadcast_to(f, (len(f), len(weights))) @ weights)
-    picture = np.zeros((SIZE, SIZE, 4), np.uint8)
-    picture[inside, :3] = np.round(255.0 * to_srgb(np.nan_to_num(xyz)))
-    picture[..., 3] = np.round(255.0 * edge)
-    return png(picture)
+    return inside, edge, lit, wi, wo
 
 
 def _local(n: Float[np.ndarray, "m 3"], w: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, "m 3"]:

@@ -66,6 +66,12 @@ def estimate(values: Float[np.ndarray, " d"]) -> Estimate:
     return Estimate(float(values[0]), (float(low), float(high)))
 
 
+def estimates(values: Float[np.ndarray, "d k"]) -> list[Estimate]:
+    """`estimate` of each column."""
+    low, high = limits(values[0], values[1:] if len(values) > 1 else values).tolist()
+    return [Estimate(*parts) for parts in zip(values[0].tolist(), zip(low, high, strict=True), strict=True)]
+
+
 def band(curves: Float[np.ndarray, "d ..."]) -> Float[np.ndarray, "3 ..."]:
     """Rows low, best, high of curves at the best fit and at each draw: the same limits as in `estimate`, pointwise."""
     low, high = limits(curves[0], curves[1:] if len(curves) > 1 else curves)

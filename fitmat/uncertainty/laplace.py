@@ -159,8 +159,13 @@ class HeavyTailed:
 
     def drawn(self, count: int, random: np.random.Generator | np.random.RandomState) -> Float[np.ndarray, "count d"]:
         """Draws of the sampled coordinates; the bounds of the parameters do not hold them."""
-        stretch = np.sqrt(HEAVY_TAIL / random.chisquare(HEAVY_TAIL, size=count))
-        x = self.centre + stretch[:, None] * (random.standard_normal((count, len(self.centre))) @ self.factor.T)
+        return self._placed(*self._random(count, random))
+
+    def _random(self, count: int, random: np.random.Generator | np.random.RandomState) -> tuple[np.ndarray, np.ndarray]:
+        return random.chisquare(HEAVY_TAIL, size=count), random.standard_normal((count, len(self.centre)))
+
+    def _placed(self, square: Float[np.ndarray, " m"], normal: Float[np.ndarray, "m d"]) -> Float[np.ndarray, "m d"]:
+        x = self.centre + np.sqrt(HEAVY_TAIL / square)[:, None] * (normal @ self.factor.T)
         x[:, -1] = np.abs(x[:, -1])
         return x
 
@@ -169,9 +174,16 @@ class HeavyTailed:
 
         Leaving out what is outside changes the density by one factor for all, which no weight notices.
         """
-        x = self.drawn(16 * count, rng)
-        natural = self.moved.unscaled(x)[:, :-1]
-        return x[((natural >= self.moved.low) & (natural <= self.moved.high)).all(axis=1)][:count]
+        random = self._random(16 * count, rng)
+        found = np.zeros((0, len(self.centre)))
+        for begin in range(0, 16 * count, 2 * count):  # all are drawn, however few are asked for, so that none changes
+            if len(found) >= count:
+                break
+            x = self._placed(*(part[begin : begin + 2 * count] for part in random))
+            natural = self.moved.unscaled(x)[:, :-1]
+            inside = ((natural >= self.moved.low) & (natural <= self.moved.high)).all(axis=1)
+            found = np.concatenate([found, x[inside]])
+        return found[:count]
 
     def log_density(self, x: Float[np.ndarray, "m d"]) -> Float[np.ndarray, " m"]:
         """The log density at s ≥ 0, up to a constant: both sides of the fold."""

@@ -240,7 +240,7 @@ def surrounded(width: float, *, isotropic: bool, finer: int = 1) -> Surrounded:
     return _surrounded(stepped(width, 2), isotropic, finer)
 
 
-@functools.lru_cache(8)
+@functools.lru_cache(16)
 def _surrounded(width: float, isotropic: bool, finer: int) -> Surrounded:
     count, pixels = (finer * n for n in ((SKY_RINGS, SKY_PIXELS) if isotropic else (COARSE_RINGS, COARSE_PIXELS)))
     nodes, weights = gauss(count)

@@ -27,7 +27,7 @@ from fitmat.colour.differences import (
 from fitmat.colour.spaces import FROM_SRGB, shown, to_srgb
 from fitmat.match.appearance import finer, scene
 from fitmat.match.appearance.scene import Raster, Screen
-from fitmat.match.appearance.spread import Seen, Spread, spread
+from fitmat.match.appearance.spread import Seen, Spread, spread, worst_twentieth
 from fitmat.match.distances import PairedDraws
 from fitmat.maths.directions import zenith
 from fitmat.models.base import AbstractBRDF
@@ -135,7 +135,7 @@ class Perceived:
     @property
     def words(self) -> str:
         """One sentence; the thresholds are `JUST_NOTICEABLE` and `CLEARLY_VISIBLE`, for the worst twentieth."""
-        by_light = sorted(self.lightings, key=lambda lighting: lighting.delta_e_2000.worst_twentieth.value)
+        by_light = sorted(self.lightings, key=lambda lighting: worst_twentieth(lighting.seen_2000))
         every, least, most = self.delta_e_2000, by_light[0], by_light[-1]
         worst = every.worst_twentieth
         least_seen, limit = worst.ci95 if worst.has_interval else (worst.value, worst.value)

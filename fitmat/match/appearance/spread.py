@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fitmat.text import brief
-from fitmat.uncertainty.estimate import Estimate, estimate
+from fitmat.uncertainty.estimate import Estimate, estimates
 
 RIM = 0.005
 """Share of a quantile that may be lost where pixels end, at the rim and where light grazes."""
@@ -65,7 +65,14 @@ def spread(lights: list[Seen]) -> Spread:
     largest, means = delta.max(axis=1), delta @ share
     rule = abs(fine - half) + fine * (RIM + abs(mean / max(means[0], 1e-300) - 1.0))
     twentieth = np.clip(coarse + fine - coarse[0], 0.0, largest)
-    return Spread(estimate(means), estimate(twentieth), estimate(largest), float(rule))
+    of_area, worst, most = estimates(np.stack([means, twentieth, largest], axis=1))
+    return Spread(of_area, worst, most, float(rule))
+
+
+def worst_twentieth(light: Seen) -> float:
+    """Of the best fits in one light: the value that `spread` has of it alone."""
+    delta, share = light.fine
+    return min(_quantile_and_mean(delta, share)[0], float(light.delta[0, light.share > 0].max()))
 
 
 def _joined(shares: list[np.ndarray]) -> np.ndarray:
