@@ -61,7 +61,8 @@ def fit(
         loss: What is minimised, by name (`fitmat.fitting.losses`); only a likelihood supports a posterior.
         masking: Static masking choice for the microfacet lobes of a named model.
         dispersion: Law that the refractive index follows over the channels' wavelengths, "cauchy", "sellmeier",
-            "drude" or "drude-lorentz" (`fitmat.models.terms.dispersive`): its few parameters are fitted instead.
+            "drude", "drude-lorentz", "smooth" or "smooth-metal" (`fitmat.models.terms.dispersive`): its few parameters
+            are fitted instead.
         max_steps: Levenberg–Marquardt iterations per start.
 
     Returns:

@@ -48,7 +48,12 @@ def measured(truth: AbstractBRDF, seed: int, names: tuple[str, ...] = NAMES) -> 
     return fm.from_arrays(m.theta_i, m.theta_o, m.value, phi=m.phi, sigma=m.sigma, channels=names)
 
 
-CASES = {"cauchy": ("lambert+ggx", plastic), "drude": ("lambert+ggx-conductor", metal)}
+CASES = {
+    "cauchy": ("lambert+ggx", plastic),
+    "smooth": ("lambert+ggx", plastic),
+    "drude": ("lambert+ggx-conductor", metal),
+    "smooth-metal": ("lambert+ggx-conductor", metal),
+}
 
 
 def found(law: str, seed: int) -> dict[str, np.ndarray]:
@@ -58,10 +63,10 @@ def found(law: str, seed: int) -> dict[str, np.ndarray]:
     fit = fm.fit(measured(truth, seed), to, dispersion=law, fixed={"ks": 1.0})
     index, kd = fm.indices(fit), fit["kd"]
     scores = {
-        "kd": (kd.value - KD * (1.0 if law == "cauchy" else 0.1)) / kd.sd,
+        "kd": (kd.value - KD * (1.0 if made is plastic else 0.1)) / kd.sd,
         "eta": (index.eta - eta) / index.eta_sd,
     }
-    if law == "drude":
+    if made is metal:
         scores["kappa"] = (index.kappa - kappa) / index.kappa_sd
     else:
         assert not index.kappa.any()

@@ -89,7 +89,8 @@ DispersionFlag = Annotated[
     str | None,
     typer.Option(
         help="Law of the refractive index over the channels' wavelengths, whose few parameters are fitted instead of "
-        "one index a channel: cauchy or sellmeier (plastic, glass), drude or drude-lorentz (metal).",
+        "one index a channel: cauchy or sellmeier (plastic, glass), drude or drude-lorentz "
+        "(metal); smooth or smooth-metal where no formula is known.",
         metavar="LAW",
         show_default=False,
     ),

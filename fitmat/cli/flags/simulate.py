@@ -35,8 +35,8 @@ WavelengthsFlag = Annotated[
 SimulatedLawFlag = Annotated[
     str | None,
     typer.Option(
-        help="Law of the refractive index over --wavelengths: cauchy, sellmeier, drude or drude-lorentz; its "
-        "parameters by --set, e.g. cauchy_a=1.48.",
+        help="Law of the refractive index over --wavelengths: cauchy, sellmeier, smooth, drude, drude-lorentz or "
+        "smooth-metal; its parameters by --set, e.g. cauchy_a=1.48.",
         metavar="LAW",
         show_default=False,
     ),

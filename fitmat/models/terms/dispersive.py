@@ -4,19 +4,26 @@ Each channel is a line, one wavelength; what a band of light makes of a law is n
 """
 
 import dataclasses
+import functools
 from abc import abstractmethod
-from typing import ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
 from fitmat._types import Scalar, Spectrum
+from fitmat.maths.arrays import library
 from fitmat.models.dispersion import cauchy, drude_lorentz, sellmeier_2
 from fitmat.models.parameters import AbstractOfChannels, param
 from fitmat.models.terms.fresnel import AbstractFresnel, conductor, dielectric, f0_from_ior
 
 F = TypeVar("F", bound="AbstractDispersive")
+S = TypeVar("S", bound="AbstractSmooth")
+
+NUMBERS = 5
+"""Of a smooth curve: from 400 to 700 nm glass to 0.0005 in η, F0 of Al, Fe, Cr, Ti and W to 0.004; the edges of gold
+and copper, which it rounds off, to 0.05 and 0.03."""
 
 
 class AbstractDispersive(AbstractFresnel, AbstractOfChannels):
@@ -177,10 +184,116 @@ class DrudeLorentz(AbstractDispersive):
         return drude_lorentz(self._um, self.epsilon, [(self.plasma, 0.0, self.damping), bound])
 
 
+def _curve(k: int, symbol: str, lower: float, upper: float, default: float, doc: str) -> Scalar:
+    """One of the `NUMBERS` that a smooth curve follows."""
+    scale = "linear" if symbol == "η" and lower == 1.0 else "log"
+    return param(
+        lower, upper, symbol=f"{symbol}_{k}", scale=scale, starts=(default,), default=default,
+        doc=f"{doc} towards which the curve is drawn, {k} of {NUMBERS} from the shortest wavelength to the longest",
+    )  # fmt: skip
+
+
+class AbstractSmooth(AbstractDispersive):
+    """An index that is smooth over the wavelength and follows no formula: cubic B-splines, weighted by `NUMBERS`.
+
+    Attributes:
+        ends: Shortest and longest wavelength of the whole spectrum, µm; None for those of `um`.
+    """
+
+    ends: eqx.AbstractVar[tuple[float, float] | None]
+
+    def of_channels(self: S, which: np.ndarray) -> S:
+        """The same curve at some of the wavelengths."""
+        some: dict[str, Any] = {"um": tuple(self.um[k] for k in which), "ends": self._ends}
+        return dataclasses.replace(self, **some)
+
+    @property
+    def _ends(self) -> tuple[float, float]:
+        return self.ends or (min(self.um), max(self.um))
+
+    def _along(self, *weights: Scalar) -> Spectrum:
+        return splines(self.um, self._ends) @ library(*weights).stack(weights)
+
+
+@functools.cache
+def splines(um: tuple[float, ...], ends: tuple[float, float]) -> np.ndarray:
+    """Cubic B-splines at some wavelengths, (c, `NUMBERS`), knots even and the ends clamped; each row adds to 1.
+
+    C. de Boor, A Practical Guide to Splines (1978), ch. IX; what is drawn lies within what the weights span.
+
+    Args:
+        um: Wavelengths, µm.
+        ends: Where the curve begins and ends, µm.
+    """
+    from scipy.interpolate import BSpline
+
+    inner = np.linspace(*ends, NUMBERS - 2)[1:-1]
+    knots = np.concatenate([np.full(4, ends[0]), inner, np.full(4, ends[1])])
+    return BSpline.design_matrix(np.clip(um, *ends), knots, 3).toarray()
+
+
+class Smooth(AbstractSmooth):
+    """A smooth η of a transparent solid, of no formula: a cubic spline over λ of five numbers.
+
+    Priors: each number is as likely anywhere from 1 to 3, and so η lies there.
+    """
+
+    suffix: ClassVar[str] = ""
+    eta_1: Scalar = _curve(1, "η", 1.0, 3.0, 1.5, "index")
+    eta_2: Scalar = _curve(2, "η", 1.0, 3.0, 1.5, "index")
+    eta_3: Scalar = _curve(3, "η", 1.0, 3.0, 1.5, "index")
+    eta_4: Scalar = _curve(4, "η", 1.0, 3.0, 1.5, "index")
+    eta_5: Scalar = _curve(5, "η", 1.0, 3.0, 1.5, "index")
+    um: tuple[float, ...] = eqx.field(static=True, kw_only=True)
+    ends: tuple[float, float] | None = eqx.field(static=True, kw_only=True, default=None)
+
+    def __call__(self, cos_d: Scalar) -> Spectrum:
+        """See `dielectric`."""
+        return dielectric(cos_d, self.index()[0])
+
+    def index(self) -> tuple[Spectrum, Spectrum]:
+        """See `splines`."""
+        eta = self._along(self.eta_1, self.eta_2, self.eta_3, self.eta_4, self.eta_5)
+        return eta, jnp.zeros_like(eta)
+
+
+class SmoothMetal(AbstractSmooth):
+    """Smooth η and κ of a metal, of no formula: the logarithm of each is a cubic spline over λ of five numbers.
+
+    Priors: the logarithm of each number is as likely anywhere, of η from 0.01 to 50, of κ from 0.1 to 50.
+    """
+
+    suffix: ClassVar[str] = "-conductor"
+    eta_1: Scalar = _curve(1, "η", 0.01, 50.0, 1.0, "real part of the index")
+    eta_2: Scalar = _curve(2, "η", 0.01, 50.0, 1.0, "real part of the index")
+    eta_3: Scalar = _curve(3, "η", 0.01, 50.0, 1.0, "real part of the index")
+    eta_4: Scalar = _curve(4, "η", 0.01, 50.0, 1.0, "real part of the index")
+    eta_5: Scalar = _curve(5, "η", 0.01, 50.0, 1.0, "real part of the index")
+    kappa_1: Scalar = _curve(1, "κ", 0.1, 50.0, 3.0, "imaginary part of the index")
+    kappa_2: Scalar = _curve(2, "κ", 0.1, 50.0, 3.0, "imaginary part of the index")
+    kappa_3: Scalar = _curve(3, "κ", 0.1, 50.0, 3.0, "imaginary part of the index")
+    kappa_4: Scalar = _curve(4, "κ", 0.1, 50.0, 3.0, "imaginary part of the index")
+    kappa_5: Scalar = _curve(5, "κ", 0.1, 50.0, 3.0, "imaginary part of the index")
+    um: tuple[float, ...] = eqx.field(static=True, kw_only=True)
+    ends: tuple[float, float] | None = eqx.field(static=True, kw_only=True, default=None)
+
+    def __call__(self, cos_d: Scalar) -> Spectrum:
+        """See `conductor`."""
+        return conductor(cos_d, *self.index())
+
+    def index(self) -> tuple[Spectrum, Spectrum]:
+        """The exponential of `splines` with the logarithms of the numbers as weights."""
+        eta = self.eta_1, self.eta_2, self.eta_3, self.eta_4, self.eta_5
+        kappa = self.kappa_1, self.kappa_2, self.kappa_3, self.kappa_4, self.kappa_5
+        return jnp.exp(self._along(*map(jnp.log, eta))), jnp.exp(self._along(*map(jnp.log, kappa)))
+
+
 LAWS: dict[str, type[AbstractDispersive]] = {
     "cauchy": Cauchy,
     "sellmeier": Sellmeier,
     "drude": Drude,
     "drude-lorentz": DrudeLorentz,
+    "smooth": Smooth,
+    "smooth-metal": SmoothMetal,
 }
 """Name → law."""

@@ -9,7 +9,16 @@ import fitmat as fm
 from fitmat.models.dispersion import cauchy, drude_lorentz, sellmeier_2
 from fitmat.models.parameters import entries, of_channels, vector, with_vector
 from fitmat.models.refractive_index import from_database
-from fitmat.models.terms.dispersive import LAWS, AbstractDispersive, Cauchy, Drude, DrudeLorentz, Sellmeier
+from fitmat.models.terms.dispersive import (
+    LAWS,
+    AbstractDispersive,
+    Cauchy,
+    Drude,
+    DrudeLorentz,
+    Sellmeier,
+    Smooth,
+    SmoothMetal,
+)
 from fitmat.models.terms.fresnel import conductor, dielectric
 
 D, F, C = 0.5875618, 0.4861327, 0.6562725
@@ -82,12 +91,12 @@ def test_terms_are_the_exact_equations_at_every_wavelength(law: str) -> None:
     term = made(LAWS[law])
     eta, kappa = (np.asarray(part) for part in term.index())
     assert eta.shape == (3,)
-    metal = law.startswith("drude")
+    metal = LAWS[law].suffix == "-conductor"
     exact = conductor(0.3, eta, kappa) if metal else dielectric(0.3, eta)
     np.testing.assert_allclose(term(np.array(0.3)), exact, rtol=ROUNDING)
     np.testing.assert_allclose(term.normal_reflectance(), term(np.array(1.0)), rtol=1e-9)
     assert (kappa > 0).all() == metal
-    assert metal or (np.diff(eta) < 0).all()
+    assert metal or law == "smooth" or (np.diff(eta) < 0).all()
 
 
 def test_indices_are_those_of_the_formulas() -> None:
@@ -109,3 +118,26 @@ def test_a_law_of_some_channels_has_their_wavelengths() -> None:
     assert [e.name for e in entries(term)] == ["cauchy_a", "cauchy_b"]
     np.testing.assert_array_equal(vector(with_vector(term, np.array([1.6, 0.01]))), [1.6, 0.01])
     assert np.asarray(of_channels(model, np.array([2, 0]), 3).kd).shape == (2,)
+
+
+def test_a_smooth_curve_is_the_line_through_its_numbers() -> None:
+    """Schoenberg: weights on a line at the means of three knots draw that line (de Boor 1978, ch. XI)."""
+    um = np.linspace(0.4, 0.7, 31)
+    knots = np.array([0.4, 0.4, 0.4, 0.55, 0.7, 0.7, 0.7])
+    at = [knots[k : k + 3].mean() for k in range(5)]
+    glass = Smooth(*(1.7 - 0.3 * x for x in at), um=tuple(um.tolist()))
+    np.testing.assert_allclose(glass.index()[0], 1.7 - 0.3 * um, rtol=1e-12)
+    metal = SmoothMetal(*(np.exp(x - 1.0) for x in at), *(np.exp(1.5 - x) for x in at), um=tuple(um.tolist()))
+    np.testing.assert_allclose(metal.index(), np.exp([-1.0 + um, 1.5 - um]), rtol=1e-12)
+
+
+def test_a_smooth_curve_stays_between_its_numbers_and_keeps_its_ends() -> None:
+    """Cox & de Boor's recursion by hand at the middle knot: 0, 1/4, 1/2, 1/4, 0; some channels lie on it too."""
+    um = (0.4, 0.55, 0.6, 0.7)
+    smooth: Any = Smooth
+    glass = smooth(1.4, 1.7, 1.5, 1.6, 1.45, um=um)
+    eta = np.asarray(glass.index()[0])
+    assert eta[[0, 3]] == pytest.approx([1.4, 1.45], abs=1e-12)
+    assert eta[1] == pytest.approx(0.25 * 1.7 + 0.5 * 1.5 + 0.25 * 1.6, abs=1e-12)
+    some = of_channels(glass, np.array([1, 2]), 4)
+    np.testing.assert_array_equal(some.index()[0], eta[1:3])
