@@ -20,6 +20,9 @@ from fitmat.models.terms.fresnel import COS_82, Dielectric
 FILM_APART = 0.05
 """How far the index of a named film may be from its law: 2 % of titanium dioxide's, and so of its thickness."""
 
+EXACT = 1e-3
+"""Of a film's index, from which its law's error is said to count: 0.05 nm of 50."""
+
 OPTICAL = ("eta", "kappa", "f0", "f82", "substrate_eta", "substrate_kappa")
 """Parameters that the refractive index determines: of the surface, or of what lies under a film."""
 
@@ -109,7 +112,9 @@ def of_film(name: str, material: str, channels: tuple[str, ...]) -> dict[str, np
             "follows Cauchy's law here, its κ is one number. Leave out what it absorbs, or hold film_eta, film_b and "
             "film_kappa by --fix."
         )
-    warnings.warn(f"--film {material}: held {law}, off by {apart:.2g} at most.", ReadAs, stacklevel=2)
+    share = apart / abs(found).min()
+    unsure = f" As much as {share:.1%} of the thickness is not in its interval." if share > EXACT else ""
+    warnings.warn(f"--film {material}: held {law}, off by {apart:.2g} at most.{unsure}", ReadAs, stacklevel=2)
     values = {"film_eta": a, "film_b": b, "film_kappa": kappa}
     names = {e.name for e in entries(model(name))}
     return {

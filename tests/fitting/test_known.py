@@ -107,6 +107,14 @@ def test_a_named_film_is_held_at_the_literature() -> None:
     assert of_film("lambert+ggx", "fused-silica", SPECTRUM) == {}
 
 
+def test_what_a_law_leaves_of_a_film_is_said() -> None:
+    """Amorphous TiO2 is 2.66 at 400 nm and 2.45 at 550 nm (Jolivet et al.): too steep for two terms."""
+    with pytest.warns(ReadAs, match=r"off by 0\.02\d? at most\. As much as 1\.\d% of the thickness is not in its int"):
+        of_film("ggx-film", "TiO2", tuple(f"{nm}" for nm in range(400, 701, 10)))
+    with pytest.warns(ReadAs, match=r"off by 0\.0001\d? at most\.$"):
+        of_film("ggx-film", "fused-silica", SPECTRUM)
+
+
 def test_one_wavelength_of_a_film_has_no_dispersion() -> None:
     """Fused silica at 546.07 nm: 1.4601 (Malitson 1965, table 1: 1.46008)."""
     with pytest.warns(ReadAs, match="--film fused-silica"):
