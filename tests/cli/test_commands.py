@@ -418,6 +418,7 @@ def test_interrupted_computation_leaves_nothing(run, tmp_path, monkeypatch, part
     assert os.listdir(tmp_path) == []
 
 
+@pytest.mark.study
 def test_simulate_and_fit_agree(run, tmp_path):
     path = tmp_path / "new" / "paint.csv"
     truth = ("--set", "kd=0.4,0.1,0.2", "--set", "alpha=0.3", "--theta-i", "20,45,70", "--theta-o", "-80:80:10")

@@ -60,6 +60,7 @@ def test_multiple_scattering_has_a_page_and_every_name_its_parameters(capsys):
     assert any(line.startswith("f0 ") for line in capsys.readouterr().out.splitlines())
 
 
+@pytest.mark.study
 def test_transmission_page_shows_what_glass_lets_through(capsys):
     """A smooth face, normal incidence: 4 % back, 96 % on; out of glass at 60° nothing."""
     manual.page("transmission")

@@ -28,7 +28,7 @@ APART = (
 )
 
 
-@pytest.mark.parametrize("name", APART)
+@pytest.mark.parametrize("name", always(APART[:3], APART))
 def test_channels_of_most_models_are_apart(name: str) -> None:
     assert apart(fm.model(name, channels=3))
 
@@ -127,6 +127,7 @@ def test_fits_end_where_one_slope_for_each_parameter_leads(asked: str, monkeypat
     np.testing.assert_allclose(together.slopes, alone.linear.slopes, atol=1e-6 * largest)  # of finite differences
 
 
+@pytest.mark.study
 def test_a_fit_that_begins_with_some_channels_ends_where_one_of_all_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     m = plastic(8)
     told: dict[str, Any] = {"priors": {"kd": (spectrum(8, 0.1, 0.6), 0.05)}}

@@ -208,6 +208,7 @@ def valley() -> Fit:
     return fm.fit(m, "lambert+ggx")
 
 
+@pytest.mark.study
 def test_no_misfit_makes_an_interval_wider_than_its_bounds(valley: Fit) -> None:
     sd = np.sqrt(np.diagonal(valley.covariance)) / valley.coordinates.slope(valley.values)
     assert valley.correlation.found

@@ -148,6 +148,7 @@ def test_an_interval_of_an_index_is_that_of_its_parameters(spectrum: fm.Measurem
     np.testing.assert_allclose(fm.indices(fit).nm, NM, rtol=1e-12)
 
 
+@pytest.mark.study
 def test_a_law_is_kept_with_a_run(spectrum: fm.Measurements, tmp_path: Any) -> None:
     """The record tells it, and what is read back reflects as what was fitted."""
     study = fm.study(spectrum, "lambert+ggx", dispersion="cauchy", fixed={"ks": 1.0}, sampling=False, short=True)

@@ -174,6 +174,7 @@ def test_a_bound_is_said_and_has_no_deviation() -> None:
     assert np.isfinite(found.sd_of("alpha")).all()
 
 
+@pytest.mark.study
 def test_neither_order_nor_tiles_nor_threads_matter(monkeypatch) -> None:
     value, sigma = surfaces(SURFACES)
     told: Any = {"to": "lambert+ggx", "loss": "gaussian"}

@@ -155,6 +155,7 @@ def test_inferred_noise_enters_the_density(made: fm.Measurements) -> None:
     np.testing.assert_allclose(density(made, model, "gaussian-inferred"), total, rtol=ROUNDING)
 
 
+@pytest.mark.study
 def test_inferred_noise_is_that_of_the_simulation() -> None:
     """2 % and 10⁻³ sr⁻¹, not told to the fit: both within three standard deviations."""
     truth = fm.model("lambert+ggx", kd=0.05, alpha=0.25)

@@ -89,6 +89,7 @@ def test_a_rotation_comes_home_and_sits_on_no_bound(brushed: Fit) -> None:
     assert np.abs(draws - brushed.values[-1]).max() <= 90.0
 
 
+@pytest.mark.study
 def test_a_rotation_with_a_prior_stays_where_the_prior_has_it(brushed: Fit) -> None:
     moved, values = brushed.coordinates, np.array(brushed.values)
     values[-1] = 170.0

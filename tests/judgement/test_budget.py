@@ -56,6 +56,7 @@ def ggx(wi: np.ndarray, wo: np.ndarray, alpha: float, eta: float) -> np.ndarray:
     return d * f / (1.0 + smith[0] + smith[1]) / (4.0 * wi[:, 2] * wo[:, 2])
 
 
+@pytest.mark.study
 def test_weights_of_two_lobes_under_a_shared_error_of_the_scale() -> None:
     """Weighted least squares of y = g (kd/π + ks L) by its normal equations, in uncertain numbers."""
     truth = fm.model("lambert+ggx", kd=0.3, ks=0.8, alpha=0.2, eta=1.5)

@@ -171,6 +171,7 @@ def test_a_prior_that_tells_all_is_not_the_data() -> None:
     assert group.combination.relative == pytest.approx(0.01 / np.sqrt(60), rel=0.2)  # σ is known to 1/√(2·60)
 
 
+@pytest.mark.study
 def test_what_is_determined_is_quoted_narrowly() -> None:
     """Random surfaces of two lobes, which neither model follows: what is determined is quoted to better than a tenth.
 

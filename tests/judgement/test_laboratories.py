@@ -96,6 +96,7 @@ def test_chance_names_nobody_more_often_than_is_stated() -> None:
     assert alarms <= 0.05 + 3.0 * np.sqrt(0.05 * 0.95 / count)
 
 
+@pytest.mark.study
 def test_one_that_is_five_percent_off_is_named() -> None:
     found = fm.compare_laboratories(measured(0.05, 0))
     assert [s.laboratory for s in found.scales if s.off] == ["lab 2"]

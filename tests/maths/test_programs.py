@@ -133,6 +133,7 @@ def kinds(names: list[str]) -> set[str]:
     return {name.rpartition("-")[0] for name in names}
 
 
+@pytest.mark.study
 def test_two_processes_fill_one_folder(filled: tuple[Path, list[Run]]) -> None:
     place, (one, other) = filled
     assert one.found == other.found

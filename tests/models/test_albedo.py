@@ -61,7 +61,7 @@ def test_ggx_against_visible_normals(alpha: float) -> None:
     np.testing.assert_allclose(from_angles(fm.model("ggx", alpha=alpha, eta=1.5), *degrees), expected, rtol=NARROW)
 
 
-@pytest.mark.parametrize("alpha", always({0.001, 0.05, 0.3, 1.0}, [0.001, 0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0]))
+@pytest.mark.parametrize("alpha", always({0.001, 0.3}, [0.001, 0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0]))
 def test_the_stated_error_bounds_the_error(alpha: float) -> None:
     """Against the average over visible normals at 17 angles, up to 88°."""
     theta = np.deg2rad(np.r_[0.0, 10:86:5, 88.0])

@@ -40,12 +40,15 @@ AXES = {"tilt": {"tilt_x": 2.0}, "disney": {"anisotropic": 0.5}}
 """Parameters by which models show their axes that hide them by default."""
 
 PLAIN = {"lambert+phong", *(n for n, lobe in LOBES.items() if not ("-aniso" in n and lobe.fresnel_suffix(n)))}
-"""Tried in every run: all but brushed lobes with another Fresnel term, which is the same code as in the others."""
+PLAIN -= {"plastic", "varnish", "rough-varnish"}
+"""Tried in every run: all but brushed lobes with another Fresnel term, which is the same code as in the others, and but
+coats, which take long."""
 
 SLOPED = {"lambert+phong", *(n for n, lobe in LOBES.items() if n.startswith("ggx") or not lobe.fresnel_suffix(n))}
-SLOPED -= {n for n in LOBES if "-kc" in n or ("-turquin" in n and n != "ggx-turquin")} | {"plastic"}
-"""Whose slopes are tried in every run: every shape, and every Fresnel term on one of them; `-kc` has a test of its own,
-plastic takes long."""
+SLOPED -= {n for n in LOBES if any(part in n for part in ("-kc", "-turquin", "-film", "-belcour"))} - {"ggx-turquin"}
+SLOPED -= {"plastic", "disney-2015"}
+"""Whose slopes are tried in every run: every shape, and every Fresnel term on one of them; `-kc`, films and Belcour's
+term have tests of their own, plastic takes long, and Disney's lobe is that of 2012 as well."""
 
 Hemisphere = Any
 Pairs = dict[str, tuple[np.ndarray, np.ndarray]]

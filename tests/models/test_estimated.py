@@ -59,6 +59,7 @@ def test_a_sum_is_the_sum_and_ks_a_factor() -> None:
     assert (below.value[[0, 2]] > 0).all()
 
 
+@pytest.mark.study
 def test_many_pairs_are_followed_in_parts_with_seeds_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(estimated, "ROWS", 64)
     wi, wo = (np.tile(w[:1], (70, 1)) for w in (WI, WO))

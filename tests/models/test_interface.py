@@ -115,7 +115,7 @@ def test_reciprocal_as_radiance_is() -> None:
 
 
 @pytest.mark.parametrize("eta", [ETA, 1 / ETA])
-@pytest.mark.parametrize("distribution", [GGX(), Beckmann()])
+@pytest.mark.parametrize("distribution", [GGX(), pytest.param(Beckmann(), marks=pytest.mark.study)])
 def test_one_collision_is_the_walks_first_and_all_lose_nothing(distribution: AbstractDistribution, eta: float) -> None:
     """From above and, with 1/η, from below: R and T of one collision, and R + T of all, within 3 standard errors."""
     glass, theta = surface(0.7, distribution, eta), np.deg2rad([0.0, 60.0])

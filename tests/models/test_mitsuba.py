@@ -304,7 +304,7 @@ def _entering(alpha: float, cosines: np.ndarray) -> np.ndarray:
     return 1 - np.asarray(jax.jit(lambda c: _coat(alpha).reflectance()(c))(jnp.array(cosines)))
 
 
-@pytest.mark.parametrize("alpha", [0.1, 0.3, 1.0])
+@pytest.mark.parametrize("alpha", always({0.3}, [0.1, 0.3, 1.0]))
 def test_face_of_rough_plastic_agrees_with_mitsuba(mitsuba: ModuleType, alpha: float) -> None:
     """With a black body."""
     lobe = Lobe("ggx", alpha, alpha)
@@ -313,7 +313,7 @@ def test_face_of_rough_plastic_agrees_with_mitsuba(mitsuba: ModuleType, alpha: f
     _assert_single_precision(ours, _theirs(mitsuba, _plastic(alpha, 0.0, 1.0), wi, wo), lobe, wi, wo)
 
 
-@pytest.mark.parametrize("alpha", always({0.1, 1.0}, PLASTIC))
+@pytest.mark.parametrize("alpha", always({0.3}, PLASTIC))
 def test_fitmat_lets_enter_what_mitsuba_transmits_or_loses(mitsuba: ModuleType, alpha: float) -> None:
     """Mitsuba's T is its Gauss rule over visible normals to single precision; ours adds what is masked behind them."""
     theirs, _ = _tables(mitsuba, alpha)
@@ -323,7 +323,7 @@ def test_fitmat_lets_enter_what_mitsuba_transmits_or_loses(mitsuba: ModuleType, 
     np.testing.assert_allclose(_entering(alpha, cosines[::6]), theirs[::6] + lost, atol=ENTERING)
 
 
-@pytest.mark.parametrize("alpha", always({0.1, 1.0}, RETURNED))
+@pytest.mark.parametrize("alpha", always({0.3}, RETURNED))
 def test_returned_light_of_rough_plastic_is_what_mitsuba_and_fitmat_define(mitsuba: ModuleType, alpha: float) -> None:
     """Mitsuba: the mean of R_1(c) c over its 64 cosines, doubled; R_1 of one scattering, from inside.
 
@@ -343,7 +343,7 @@ def test_returned_light_of_rough_plastic_is_what_mitsuba_and_fitmat_define(mitsu
     assert (round(theirs, 3), round(ours, 3)) == pytest.approx(RETURNED[alpha], abs=0.002)
 
 
-@pytest.mark.parametrize("alpha", PLASTIC)
+@pytest.mark.parametrize("alpha", always({0.3}, PLASTIC))
 def test_rough_plastic_is_mitsubas_but_for_what_enters_and_returns(mitsuba: ModuleType, alpha: float) -> None:
     """Our body with Mitsuba's T and R in the place of ours is its body; then ours as it is."""
     lobe, kd = Lobe("ggx", alpha, alpha), 0.5

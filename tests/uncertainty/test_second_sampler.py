@@ -33,6 +33,7 @@ def inferred() -> SecondOpinion:
     return fm.check_posterior(cut_off("default"), seed=2)
 
 
+@pytest.mark.study
 def test_both_samplers_find_the_truncated_gaussian(exact: SecondOpinion) -> None:
     """y = k_d/π + σ ε: the posterior of k_d is Gaussian with the weighted mean, cut off at 1."""
     m = exact.posterior.fit.measurements
@@ -63,6 +64,7 @@ def chains(posterior: Posterior) -> np.ndarray:
     return np.swapaxes(posterior.chain, 0, 1)
 
 
+@pytest.mark.study
 def test_a_shifted_mean_and_a_narrow_tail_are_noticed(inferred: SecondOpinion) -> None:
     posterior = inferred.posterior
     other = chains(posterior)
@@ -78,6 +80,7 @@ def test_a_shifted_mean_and_a_narrow_tail_are_noticed(inferred: SecondOpinion) -
     assert "limit differs by" in narrow.words
 
 
+@pytest.mark.study
 def test_a_second_sampler_that_did_not_converge_has_no_say(inferred: SecondOpinion) -> None:
     posterior = inferred.posterior
     other = chains(posterior)
@@ -96,6 +99,7 @@ def test_a_missing_sampler_is_said_before_anything_is_sampled(
         fm.check_posterior(dataclasses.replace(inferred.posterior, chain=None), seed=1)
 
 
+@pytest.mark.study
 def test_without_a_chain_there_is_nothing_to_check(inferred: SecondOpinion) -> None:
     bare = dataclasses.replace(inferred.posterior, chain=None)
     with pytest.raises(FitmatError, match=r"lambert: was not sampled, so that there is no chain to check; sample it "):

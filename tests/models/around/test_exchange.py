@@ -63,13 +63,14 @@ PUBLISHED = {(0.05, 60.0): 0.977, (0.2, 60.0): 0.824, (0.5, 0.0): 0.519}
 """(alpha, degrees) → albedo of white GGX under varnish, eta 1.5, by a photon program of another author."""
 
 
-@pytest.mark.parametrize(("alpha", "degrees"), PUBLISHED)
-def test_what_is_totally_reflected_comes_back(alpha: float, degrees: float) -> None:
-    assert reflected(varnished(facets(alpha, 1.0)), [degrees])[0] == pytest.approx(PUBLISHED[alpha, degrees], abs=BIAS)
+@pytest.mark.parametrize("at", always({(0.2, 60.0)}, PUBLISHED))
+def test_what_is_totally_reflected_comes_back(at: tuple[float, float]) -> None:
+    alpha, degrees = at
+    assert reflected(varnished(facets(alpha, 1.0)), [degrees])[0] == pytest.approx(PUBLISHED[at], abs=BIAS)
 
 
-@pytest.mark.parametrize("f0", always({0.5}, [1.0, 0.5, 0.04]))
-@pytest.mark.parametrize("alpha", always({0.2}, [0.05, 0.2, 0.5]))
+@pytest.mark.parametrize("f0", always(set(), [1.0, 0.5, 0.04]))
+@pytest.mark.parametrize("alpha", [0.05, 0.2, 0.5])
 def test_coats_over_metals_keep_the_energy_that_photons_keep(f0: float, alpha: float) -> None:
     """Four angles of incidence; a coat that absorbs as well."""
     degrees, base = [0.0, 30.0, 60.0, 80.0], coat_photons.Facets(alpha, coat_photons.schlick(f0))
@@ -182,6 +183,7 @@ def test_narrow_white_facets_under_a_rough_face_keep_the_light_and_no_more(face:
     assert (found > 0.97).all()
 
 
+@pytest.mark.study
 def test_the_mirror_image_of_a_coat_below_goes_back_and_forth() -> None:
     """Two polished faces over black, eta_1 then eta_2/eta_1 relative: F + T² p/(1 − p F), as two plates."""
     model, wi = varnished(varnished(Lambert(jnp.zeros(())), 1.4)), np.array([0.6, 0.0, 0.8])

@@ -86,6 +86,7 @@ def test_the_peak_moves_by_twice_the_tilt(tilt: float) -> None:
     assert _peak(tilt, 30.0) == pytest.approx(30.0 + 2 * tilt, abs=PEAK)
 
 
+@pytest.mark.study
 def test_the_peak_moves_two_degrees_per_degree() -> None:
     """∂peak/∂tilt by the implicit function theorem, −(∂²ln f/∂θ∂t)/(∂²ln f/∂θ²) at the peak, is 2."""
     template = fm.model("tilt-over-ggx", alpha=1e-3, tilt_x=1.0)

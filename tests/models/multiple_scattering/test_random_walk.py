@@ -156,7 +156,7 @@ def test_dielectrics_agree_with_heitzs_program() -> None:
         assert (np.abs(ours.value[:, 0] - [row.value for row in theirs]) <= SIGMAS * error).all()
 
 
-@BOTH
+@pytest.mark.parametrize("distribution", [GGX(), pytest.param(Beckmann(), marks=pytest.mark.study)])
 def test_first_order_is_the_height_correlated_microfacet_lobe(distribution: AbstractDistribution) -> None:
     """Slab: exactly; walk: within its standard error. The lobe itself is tested against Mitsuba 3 elsewhere."""
     for slopes in [(0.5, 0.5), (0.2, 0.7)]:
@@ -305,6 +305,7 @@ def test_cut_paths_are_counted(estimator: Estimator, monkeypatch: pytest.MonkeyP
     assert found.omitted[1] == pytest.approx(0.29038, abs=0.02)
 
 
+@pytest.mark.study
 def test_runs_repeat_and_seeds_differ() -> None:
     surface = Surface(GGX(), (0.5, 0.5), Mirrors())
     for estimator in (evaluate_walk, evaluate_slab):
