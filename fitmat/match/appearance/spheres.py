@@ -213,12 +213,14 @@ def under_sky(part: Draws, around: scene.Surrounded, weights: Float[np.ndarray, 
     """Weighted radiances of every draw in the environment."""
     found = np.zeros((len(part[1]), *around.light.shape[:2], weights.shape[1]))
     for rows, k, (f,) in blocks([part], list(zip(around.wi, around.wo, strict=True))):
-        found[rows, k] = around.light[k] @ _coloured(f, weights)
+        found[rows, k] = np.tensordot(_coloured(f, weights), around.light[k], axes=(1, 1)).transpose(0, 2, 1)
     return found.reshape(len(found), -1, weights.shape[1])
 
 
 def _coloured(f: Float[np.ndarray, "d m c"], weights: Float[np.ndarray, "c k"]) -> Float[np.ndarray, "d m k"]:
     """Values in the channels, weighted; of a model with one value for all where there are several."""
+    if f.shape[2] == len(weights) == 1:
+        return f * weights[0]  # as good as a product of matrices, and ten times as fast
     return np.broadcast_to(f, (*f.shape[:2], len(weights))) @ weights
 
 
