@@ -26,6 +26,9 @@ EXACT = 1e-3
 OPTICAL = ("eta", "kappa", "f0", "f82", "substrate_eta", "substrate_kappa")
 """Parameters that the refractive index determines: of the surface, or of what lies under a film."""
 
+OF_FILM = ("film_eta", "film_b", "film_kappa")
+"""Parameters that the material of a film determines."""
+
 Known = dict[str, dict[str, np.ndarray]]
 """Model name → parameter → value to hold."""
 
@@ -115,7 +118,7 @@ def of_film(name: str, material: str, channels: tuple[str, ...]) -> dict[str, np
     share = apart / abs(found).min()
     unsure = f" As much as {share:.1%} of the thickness is not in its interval." if share > EXACT else ""
     warnings.warn(f"--film {material}: held {law}, off by {apart:.2g} at most.{unsure}", ReadAs, stacklevel=2)
-    values = {"film_eta": a, "film_b": b, "film_kappa": kappa}
+    values = dict(zip(OF_FILM, (a, b, kappa), strict=True))
     names = {e.name for e in entries(model(name))}
     return {
         key if key in names else f"{part}.{key}": np.array([value]) for part in films for key, value in values.items()

@@ -174,9 +174,11 @@ def _of(given: Mapping[str, Any] | None, names: set[str]) -> dict[str, Any]:
 
 def _refuse_known(fixed: Container[str], held: Iterable[str]) -> None:
     for key in held:
-        if key in fixed and key.rpartition(".")[2] in known.OPTICAL:
+        name = key.rpartition(".")[2]
+        if key in fixed and name in (*known.OPTICAL, *known.OF_FILM):
+            flag = "--film" if name in known.OF_FILM else "--ior"
             expected = "expected one of the two: the material says it already"
-            raise ModelError(f"--fix {key} beside --ior, {expected}. Leave one out.")
+            raise ModelError(f"--fix {key} beside {flag}, {expected}. Leave one out.")
 
 
 def _refuse_foreign(flag: str, given: Mapping[str, np.ndarray], having: Mapping[str, set[str]]) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fitmat as fm
-from fitmat.errors import ModelError
+from fitmat.errors import ModelError, ReadAs
 from fitmat.measurements.samples import Measurements
 from fitmat.models.simulation import simulate
 from fitmat.studies.plan import model_names, plan
@@ -69,5 +69,9 @@ def test_what_a_material_says_is_not_said_again(measurements: Measurements) -> N
         ModelError, match="--fix eta beside --ior, expected one of the two: the material says it already"
     ):
         plan("ggx", measurements, ior="N-BK7", fixed={"eta": 1.5})
+    spectrum = fm.from_arrays(0.5, [0.1, 0.2], np.ones((2, 3)), channels=("450", "550", "650"))
+    refused = pytest.raises(ModelError, match="--fix film_eta beside --film, expected one of the two")
+    with refused, pytest.warns(ReadAs, match="--film TiO2: held"):
+        plan("ggx-film", spectrum, film="TiO2", fixed={"film_eta": 2.0})
     with pytest.raises(ModelError, match=r"eta is fixed and has a prior \(--fix or --ior, and --prior\)"):
         plan("ggx", measurements, ior="N-BK7", priors={"eta": (1.5, 0.1)})
