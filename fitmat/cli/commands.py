@@ -13,8 +13,10 @@ from fitmat.cli import examples, process
 from fitmat.cli.entry import app
 from fitmat.cli.flags.design import CountFlag, ForFlag, KindFlag
 from fitmat.cli.flags.files import (
+    CompleteFlag,
     ConvertedFlag,
     DesignPlotFlag,
+    FillingFlag,
     ForceFlag,
     JsonFlag,
     OpenFlag,
@@ -191,13 +193,17 @@ def convert(
     files: list[Path],
     reading: dict[str, Any],
     out: ConvertedFlag,
+    complete: CompleteFlag = False,
+    model: FillingFlag = "lambert+ggx",
     force: ReplaceFlag = False,
 ) -> None:
     """Write measurements in another format; what that cannot hold is said."""
-    process.refuse_little_memory()
-    from fitmat.cli import convert
+    (process.set_up if complete else process.refuse_little_memory)()
+    from fitmat.cli import convert, session
 
-    process.say("\n".join([*convert.written(files, reading, out, force=force), visible(str(out))]))
+    with session.watch() as watch:
+        told = convert.written(files, reading, out, watch, force=force, model=model if complete else None)
+    process.say("\n".join([*told, visible(str(out))]))
 
 
 @app.command(

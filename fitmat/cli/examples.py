@@ -34,7 +34,8 @@ CHECK = "Examples:\n\n  fitmat check measurements.csv --plot coverage.png\n\n  f
 CONVERT = (
     "Examples:\n\n"
     "  fitmat convert gold.binary gold.parquet\n\n"
-    "  fitmat convert scan.txt scan.bsdf --columns theta_i=AOI,brdf=4"
+    "  fitmat convert scan.txt scan.bsdf --columns theta_i=AOI,brdf=4\n\n"
+    "  fitmat convert plane.csv whole.binary --complete"
 )
 
 DESIGN = (

@@ -69,6 +69,7 @@ class Measurements:
         warnings: Plain sentences: what may have been read otherwise than it was meant.
         stated: What the file says that its values add up to.
         horizontal: Masked values at θ_o = 90°, sr⁻¹, NaN elsewhere, (n, c); None where there are none.
+        inferred: Rows that were not measured but inferred from the others, (n,); None where there are none.
     """
 
     wi: Float[np.ndarray, "n 3"]
@@ -84,6 +85,7 @@ class Measurements:
     warnings: tuple[str, ...] = ()
     stated: tuple[StatedAlbedo, ...] = ()
     horizontal: Float[np.ndarray, "n c"] | None = None
+    inferred: Bool[np.ndarray, " n"] | None = None
 
     __repr__ = brief
 
@@ -94,14 +96,20 @@ class Measurements:
         for stated in self.stated:
             arguments.kind("one of stated", stated, StatedAlbedo)
         count, columns = len(self.wi) if isinstance(self.wi, np.ndarray) else 0, len(self.channels)
-        shapes = {"wi": (count, 3), "wo": (count, 3), "value": (count, columns), "valid": (count, columns)}
+        shapes: dict[str, tuple[int, ...]] = {
+            "wi": (count, 3),
+            "wo": (count, 3),
+            "value": (count, columns),
+            "valid": (count, columns),
+        }
         beside = ("sigma", "horizontal")
+        shapes |= {} if self.inferred is None else {"inferred": (count,)}
         for name, shape in (shapes | {n: shapes["value"] for n in beside if getattr(self, n) is not None}).items():
             arguments.kind(name, given := getattr(self, name), np.ndarray)
             if given.shape != shape:
-                got, columns = f"{name} of shape {given.shape}", f"{shape[1]} columns"
+                got, columns = f"{name} of shape {given.shape}", f", {shape[1]} columns" if shape[1:] else ""
                 raise ReadError(
-                    f"{got}, expected {shape}: a row for each of wi, {columns}. fitmat.from_arrays makes them."
+                    f"{got}, expected {shape}: a row for each of wi{columns}. fitmat.from_arrays makes them."
                 )
 
     @property
@@ -163,7 +171,7 @@ class Measurements:
 
     def rows(self, keep: np.ndarray) -> "Measurements":
         """The rows selected by a mask or by indices; counts of what was masked stay those of the source."""
-        names = ("wi", "wo", "value", "sigma", "valid", "horizontal")
+        names = ("wi", "wo", "value", "sigma", "valid", "horizontal", "inferred")
         parts = {name: part[keep] for name in names if (part := getattr(self, name)) is not None}
         return dataclasses.replace(self, **parts)
 
@@ -181,6 +189,8 @@ class Measurements:
             f"incidence {listed}; sigma {'given' if self.sigma is not None else 'not given'}",
         ]
         lines += [f"{count} masked: {reason}" for reason, count in self.masked.items()]
+        if self.inferred is not None:
+            lines += [f"{np.count_nonzero(self.inferred)} inferred, not measured"]
         lines += [f"WARNING: {warning}" for warning in self.warnings]
         return "\n".join([*lines, *self.notes, *filter(None, [str(self.instrument)])])
 

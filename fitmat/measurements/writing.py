@@ -12,6 +12,8 @@ from typing import Any
 from fitmat import arguments
 from fitmat.errors import OutputError
 from fitmat.files import write_bytes
+from fitmat.measurements.gaps import Directions
+from fitmat.measurements.gaps import gaps as own_gaps
 from fitmat.measurements.samples import Measurements
 
 FORMATS = {".csv": "csv", ".parquet": "parquet", ".binary": "merl", ".bsdf": "zemax", ".alta": "alta"}
@@ -19,8 +21,14 @@ FORMATS = {".csv": "csv", ".parquet": "parquet", ".binary": "merl", ".bsdf": "ze
 `losses(measurements)`, what it leaves out in sentences."""
 
 
+TABLES = (".csv", ".parquet")
+"""Suffixes of what has a column for everything."""
+
+
 def write(measurements: Measurements, path: str | os.PathLike[str], force: bool = False) -> Path:
     """Write measurements in the format that the suffix names; what the format cannot hold is warned of.
+
+    Of completed ones the table says what was inferred; beside another format stands NAME.cells.parquet, which does.
 
     Args:
         measurements: What to write.
@@ -38,13 +46,45 @@ def write(measurements: Measurements, path: str | os.PathLike[str], force: bool 
     arguments.kind("path", path, str, os.PathLike)
     arguments.flags(force=force)
     target = Path(path)
-    room = _room(target)
-    if os.path.lexists(target) and not force:
-        raise OutputError(f"{target}: already exists; choose another name, or --force (force=True) to replace it.")
-    content = room.dump(measurements)
+    beside = None if measurements.inferred is None else marks(target)
+    _refuse_existing(target, beside, force=force)
+    content = _room(target).dump(measurements)
     if lost := losses(measurements, target):
         warnings.warn(f"{target.name}: {' '.join(lost)}", stacklevel=2)
+    if beside is not None:
+        write_bytes(beside, _room(beside).dump(measurements))
     return write_bytes(target, content.encode() if isinstance(content, str) else content)
+
+
+def marks(target: Path) -> Path | None:
+    """Where it stands what was inferred, and how well it is known; None where the file itself has room for it."""
+    return None if target.suffix.lower() in TABLES else target.with_name(f"{target.stem}.cells.parquet")
+
+
+def gaps(measurements: Measurements, path: str | os.PathLike[str], force: bool = False) -> Directions:
+    """Directions that a complete file would hold, and that were not measured, before any work is done for them.
+
+    Args:
+        measurements: What was measured.
+        path: The file, whose suffix names the format: MERL has a grid of its own, else it is that of the table.
+        force: As in `write`.
+
+    Returns:
+        Unit vectors to the light and to the sensor, (m, 3) each.
+
+    Raises:
+        OutputError: as `write`, or nothing is missing, or the angles form no grid.
+    """
+    target = Path(path)
+    room = _room(target)
+    _refuse_existing(target, marks(target), force=force)
+    return getattr(room, "gaps", own_gaps)(measurements)
+
+
+def _refuse_existing(*paths: Path | None, force: bool) -> None:
+    for path in paths:
+        if path is not None and _room(path) and os.path.lexists(path) and not force:
+            raise OutputError(f"{path}: already exists; choose another name, or --force (force=True) to replace it.")
 
 
 def losses(measurements: Measurements, path: str | os.PathLike[str]) -> tuple[str, ...]:

@@ -15,11 +15,14 @@ import numpy as np
 import polars as pl
 from jaxtyping import Float
 
+from fitmat import arguments
 from fitmat.errors import OutputError
 from fitmat.extras import needed
+from fitmat.fitting.completing import completed
 from fitmat.fitting.coordinates import channel_names
 from fitmat.fitting.quantities import Quantity, dataframe, named
 from fitmat.fitting.result import Fit, by_curvature, quantities
+from fitmat.measurements.samples import Measurements
 from fitmat.models.parameters import Entry
 from fitmat.text import brief, html_table, text_table, with_error
 from fitmat.uncertainty.estimate import limits
@@ -223,6 +226,32 @@ class Posterior:
         """
         chosen = np.linspace(0, len(self.drawn) - 1, min(count, len(self.drawn))).astype(int)
         return (self.values if widened else self.drawn)[chosen], self.discrepancy[chosen]
+
+    def complete(
+        self,
+        wi: Float[np.ndarray, "m 3"],
+        wo: Float[np.ndarray, "m 3"],
+        measurements: Measurements | None = None,
+    ) -> Measurements:
+        """What was measured, with more rows for directions that were not: the model, and what it misses nearby.
+
+        Args:
+            wi: Unit vectors to the light, of the rows to infer.
+            wo: Unit vectors to the sensor.
+            measurements: All that was measured, where the fit saw a part of it.
+
+        Returns:
+            Measured rows unchanged, with their noise as σ; inferred ones marked by `inferred`, σ their standard
+            deviation.
+
+        Raises:
+            ModelError: there is no finite fit, or no likelihood.
+        """
+        for name, w in (("wi", wi), ("wo", wo)):
+            found = arguments.numbers(name, w)
+            if found.ndim != 2 or found.shape[1] != 3 or not (found[:, 2] > 0).all():
+                arguments.refuse(name, w, "unit vectors above the surface, (m, 3)")
+        return completed(self.fit, self.values, np.asarray(wi, float), np.asarray(wo, float), measurements)
 
     def table(self) -> pl.DataFrame:
         """The draws as a table: chain (walker), draw (step), each free parameter (and channel), discrepancy."""

@@ -196,6 +196,36 @@ def test_convert_to_merl_refuses_what_is_there_until_forced(run: Run, sparse: Pa
     assert Path("gold.binary").stat().st_size == 12 + 3 * 8 * 90 * 90 * 180
 
 
+@pytest.mark.study
+def test_convert_completes_a_table(run: Run, sparse: Path) -> None:
+    """Each third reading is missing: what is there stays, what was missing is inferred to within its sd."""
+    lines = sparse.read_text().splitlines()
+    head = [line for line in lines if line.startswith("#")]
+    columns, *rows = lines[len(head) :]
+    Path("holes.csv").write_text("\n".join([columns, *(row for k, row in enumerate(rows) if k % 3)]) + "\n")
+    ended = run("convert", "holes.csv", "whole.csv", "--complete")
+    assert ended.code == 0
+    assert "34 rows as measured, 17 inferred, half of them to within " in ended.out
+    first, last = numbers("sparse.csv"), numbers("whole.csv")
+    assert last["theta_o"] == pytest.approx(first["theta_o"], abs=GROUPED)
+    inferred = last["inferred"] == 1
+    found, sd, meant = last["brdf"], last["sigma"], first["brdf"]
+    assert found[~inferred] == pytest.approx(meant[~inferred], rel=SEVEN_DIGITS)
+    assert np.mean(np.abs(found - meant)[inferred] < 2.0 * np.hypot(sd, first["sigma"])[inferred]) > 0.8
+
+
+def test_what_cannot_be_completed_is_one_sentence(run: Run, sparse: Path) -> None:
+    whole = run("convert", sparse, "b.csv", "--complete")
+    assert_refused(whole, r"sparse\.csv: nothing to complete: every direction of its grid was measured\. Leave it out")
+    assert_refused(run("convert", sparse, "b.csv", "--complete", "--model", "lambort"), "no lobe 'lambort'")
+    two = run("convert", sparse, "b.csv", "--complete", "--model", "lambert,ggx")
+    assert_refused(two, r"--model lambert,ggx: 2 models, expected the one that fills the gaps")
+    Path("few.csv").write_text("theta_i,theta_o,brdf\n10,10,1\n10,20,1\n20,10,1\n")
+    few = run("convert", "few.csv", "b.csv", "--complete")
+    assert_refused(few, r"few\.csv: 3 valid samples, but lambert\+ggx has 4 free parameters")
+    assert sorted(os.listdir()) == ["few.csv", "sparse.csv"]
+
+
 def test_a_conversion_that_fails_leaves_the_old_file(run: Run, tmp_path: Path) -> None:
     """Three directions at random fill no grid, which a Zemax file needs."""
     source, target = tmp_path / "few.csv", tmp_path / "few.bsdf"

@@ -71,6 +71,19 @@ ConvertedFlag = Annotated[
     typer.Argument(help="File to write: .csv, .parquet, .binary (MERL), .bsdf (Zemax) or .alta.", show_default=False),
 ]
 
+CompleteFlag = Annotated[
+    bool,
+    typer.Option(
+        "--complete",
+        help="Fill what was not measured: all cells of a .binary (MERL), else the table's own grid, by a fitted model "
+        "and what it misses nearby; each inferred value is marked, with its sd.",
+    ),
+]
+
+FillingFlag = Annotated[
+    str, typer.Option(help="Model that fills the gaps; see [bold]fitmat models[/bold].", metavar="NAME")
+]
+
 ReplaceFlag = Annotated[bool, typer.Option("--force", help="Replace what is written where it exists.")]
 
 ReplacePlotFlag = Annotated[bool, typer.Option("--force", help="Replace the picture of --plot where it exists.")]

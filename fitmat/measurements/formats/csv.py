@@ -18,6 +18,9 @@ FLAT = 1e-6
 """Radians; an azimuth this close to 0 or π is written as the sign of theta_o."""
 
 
+INFERRED = "inferred"
+"""The column that tells what was inferred from what was measured."""
+
 CHANNEL = "channel"
 """The column that names the channel of each row, where the header cannot."""
 
@@ -28,10 +31,13 @@ def columns(measurements: Measurements) -> dict[str, Shaped[np.ndarray, " n"]]:
     theta_i, theta_o, brdf (brdf_r, … for several channels) and, where known, sigma; in the plane of incidence theta_o
     is signed, positive on the mirror side, else phi follows it, or phi_i and phi_o where the light does not always come
     from azimuth 0. Masked values are NaN. Where a channel's name would not be known again behind brdf_ or sigma_, each
-    row is one value, and a column `channel` says of which channel.
+    row is one value, and a column `channel` says of which channel. Where rows were inferred, a column `inferred` has
+    1 for these and 0 for what was measured.
     """
     angles = {name: np.rad2deg(angle) for name, angle in _angles(measurements).items()}
     m, names = measurements, measurements.channels
+    if m.inferred is not None:
+        angles |= {INFERRED: m.inferred.astype(float)}
     numbers = {"brdf": m.value} if m.sigma is None else {"brdf": m.value, "sigma": m.sigma}
     numbers = {kind: np.where(m.valid, number, np.nan) for kind, number in numbers.items()}
     if names == default_channels(1):
@@ -80,7 +86,7 @@ def dump(measurements: Measurements, comments: Iterable[str] = ()) -> str:
         table[CHANNEL] = np.array([_cell(name) for name in table[CHANNEL]], dtype=object)
     angles = [name for name in table if name.startswith(("theta", "phi"))]
     rounded = {name: np.round(column, 6) + 0.0 if name in angles else column for name, column in table.items()}
-    line = ",".join("%.9g" if name in angles else "%s" if name == CHANNEL else "%.6e" for name in table)
+    line = ",".join("%.9g" if name in (*angles, INFERRED) else "%s" if name == CHANNEL else "%.6e" for name in table)
     rows = [line % row for row in zip(*(column.tolist() for column in rounded.values()), strict=True)]
     return "\n".join([*(f"# {comment}" for comment in comments), ",".join(table), *rows, ""])
 

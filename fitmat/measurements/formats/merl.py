@@ -30,6 +30,9 @@ SHAPE = (90, 90, 180)
 SCALE = np.array([1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0])
 """sr⁻¹ for each unit of the R, G and B planes."""
 
+LOWEST = 1e-6
+"""Cosine of the horizon."""
+
 INVALID = -1.0
 """What a plane holds where there is no datum."""
 
@@ -95,6 +98,20 @@ def dump(measurements: Measurements) -> bytes:
     filled = (grid.samples > 0) & (grid.mean >= 0)
     planes = np.where(filled, grid.mean / SCALE, INVALID)
     return np.array(SHAPE, "<i4").tobytes() + np.ascontiguousarray(planes.T, "<f8").tobytes()
+
+
+def gaps(measurements: Measurements) -> tuple[Float[np.ndarray, "m 3"], Float[np.ndarray, "m 3"]]:
+    """Directions of the cells above the horizon into which no valid sample falls.
+
+    Raises:
+        OutputError: neither 1 nor 3 channels, or there is no such cell.
+    """
+    empty = ~(_gridded(measurements).samples > 0).any(axis=1)
+    wi, wo = centres()
+    asked = empty & (wi[:, 2] > LOWEST) & (wo[:, 2] > LOWEST)
+    if not asked.any():
+        raise OutputError(f"{measurements.source}: nothing to complete: every MERL cell is filled. Leave it out.")
+    return wi[asked], wo[asked]
 
 
 def losses(measurements: Measurements) -> tuple[str, ...]:
