@@ -34,6 +34,9 @@ MORE_HASTE = "jax_disable_most_optimizations"
 CAREFUL = {"test_base", "test_random_walk", "test_position_free", "test_streamed"}
 """Files that run longer than they compile, or whose slopes lie close to underflow."""
 
+COMPILES = {"test_laws", "test_albedo"}
+"""Files whose studies compile every model and compute little: hastily there as well."""
+
 KNOWS_HASTE = "0.10."
 """Releases of jaxlib that were seen to know these flags: an unknown flag ends the process."""
 
@@ -71,7 +74,8 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 @pytest.fixture(autouse=True, scope="module")
 def _programs(request: pytest.FixtureRequest) -> Iterator[None]:
     """Compile as suits the file, and let go of programs afterwards if a process holds many memory maps by them."""
-    hasty = os.environ.get(MORE_HASTE.upper()) == "1" and request.module.__name__.rpartition(".")[2] not in CAREFUL
+    name = request.module.__name__.rpartition(".")[2]
+    hasty = name in COMPILES or (os.environ.get(MORE_HASTE.upper()) == "1" and name not in CAREFUL)
     jax.config.update(MORE_HASTE, hasty)
     yield
     maps = Path("/proc/self/maps")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from selection import always
+from selection import TRIED, always
 
 import fitmat as fm
 from fitmat._types import Scalar, Spectrum, Vec3
@@ -27,14 +27,6 @@ SUMS = ["lambert+phong", "lambert+ggx-schlick"]
 ALL = [*(laws.examples(name)[0] for name in LOBES), *SUMS]
 PLAIN = [name for name, lobe in LOBES.items() if not lobe.fresnel_suffix(name)]
 """One lobe for each class, roughness and distribution: with the exact dielectric, or without a Fresnel term."""
-
-TRIED = [
-    n
-    for n, lobe in LOBES.items()
-    if not (lobe.fresnel_suffix(n) and any(part in n for part in ("-aniso", "-kc", "-turquin")))
-]
-"""Fresnel terms are the same code in every lobe: tried with isotropic roughness and without compensation only. All
-combinations are measured by `fitmat models --check`."""
 
 QUICK = {"lambert", "blinn-phong", "ward", "cook-torrance", "ggx", "beckmann-schlick", "lambert+ggx-schlick", "abg"}
 """Tried in every run; the others, some of which take seconds to compile, in the study. A model is `example(lobe)`."""
