@@ -9,7 +9,7 @@ It writes no file.
 import dataclasses
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from fitmat.errors import ModelError
 from fitmat.fitting.correlation import places
@@ -27,6 +27,9 @@ DRAWS, FEWEST_DRAWS, WORK = 64, 12, 20_000_000
 
 FEWEST = 30
 """Rows from which on residuals are carried over."""
+
+FLAT = 0.5, 0.2
+"""Cosines of the flatter direction from which on errors are judged by themselves."""
 
 QUIET = 0.05
 """The share of readings that are less noisy than the scale at which the stabilised coordinate turns linear."""
@@ -126,16 +129,21 @@ def _inferred(
         sd[:] = np.sqrt(np.mean((moved - before) ** 2, axis=0) + np.mean(rest**2, axis=0))
         return _physical(scale, z, sd, there_kappa)
     variance = np.mean((noise / spread(np.abs(x), scale.noise, scale.s)) ** 2, axis=1)
-    learnt = kriging(_places(fit, known.wi, known.wo), rest, np.maximum(variance, 1e-8))
+    learnt = kriging(_places(fit, known.wi, known.wo), rest, np.maximum(variance, 1e-8), _sorts(known.wi, known.wo))
     at_known = scale.of(values(fit.model, draws, known.wi, known.wo) * kappa) - (scale.of(x) - rest)
     at_known = np.moveaxis(at_known, 0, 1).reshape(len(x), -1)
-    for part in learnt.predicted(_places(fit, wi, wo)):
+    for part in learnt.predicted(_places(fit, wi, wo), _sorts(wi, wo)):
         z[part.some] += _carried(learnt.rest, part.near, part.weights)
         there = values(fit.model, draws, wi[part.some], wo[part.some]) * there_kappa[part.some]
         moved = np.moveaxis(scale.of(there) - before[part.some], 0, 1)
         moved -= _carried(at_known, part.near, part.weights).reshape(moved.shape)
         sd[part.some] = np.sqrt(np.mean(moved**2, axis=1) + part.sd[:, None] ** 2)
     return _physical(scale, z, sd, there_kappa)
+
+
+def _sorts(wi: np.ndarray, wo: np.ndarray) -> Int[np.ndarray, " n"]:
+    """0 of directions far above the horizon, and more towards it, where models miss most."""
+    return np.searchsorted(-np.array(FLAT), -np.minimum(wi[:, 2], wo[:, 2]))
 
 
 def _carried(rest: np.ndarray, near: np.ndarray, weights: np.ndarray) -> np.ndarray:

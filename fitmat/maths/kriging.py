@@ -57,7 +57,7 @@ class Kriging:
         lengths: Over which values are alike, in the scale of the places, (d,).
         process: τ², variance of the process.
         own: η², of what each place has for itself.
-        stretch: Factors of the error at `SHARES`.
+        stretch: Factors of the error at `SHARES`, of each sort of place, (s, 4).
     """
 
     places: Float[np.ndarray, "n d"]
@@ -66,11 +66,11 @@ class Kriging:
     lengths: Float[np.ndarray, " d"]
     process: float
     own: float
-    stretch: Float[np.ndarray, " 4"]
+    stretch: Float[np.ndarray, "s 4"]
 
     __repr__ = brief
 
-    def predicted(self, places: Float[np.ndarray, "m d"]) -> Iterator["Part"]:
+    def predicted(self, places: Float[np.ndarray, "m d"], sorts: Int[np.ndarray, " m"]) -> Iterator["Part"]:
         """Some places at a time; what is expected of a place is its weights times the values of its neighbours."""
         tree, scaled = KDTree(self.places), places / self.lengths
         for begin in range(0, len(places), AT_ONCE):
@@ -78,7 +78,7 @@ class Kriging:
             _, near = tree.query(scaled[some], k=min(NEIGHBOURS, len(self.places)))
             near = near.reshape(some.stop - some.start, -1)
             weights, variance = self.told(scaled[some], near)
-            yield Part(some, near, weights, np.sqrt(variance) * self.stretched(variance))
+            yield Part(some, near, weights, np.sqrt(variance) * self.stretched(variance, sorts[some]))
 
     def told(
         self, at: Float[np.ndarray, "m d"], near: Int[np.ndarray, "m k"]
@@ -93,9 +93,10 @@ class Kriging:
         left = self.process + self.own - np.sum(weights * alike, axis=1)
         return weights, np.maximum(left, 1e-6 * (self.process + self.own))
 
-    def stretched(self, variance: Float[np.ndarray, " m"]) -> Float[np.ndarray, " m"]:
-        """The factor of the errors that leave such variances."""
-        return np.interp(variance / (self.process + self.own), SHARES, self.stretch)
+    def stretched(self, variance: Float[np.ndarray, " m"], sorts: Int[np.ndarray, " m"]) -> Float[np.ndarray, " m"]:
+        """The factor of the errors that leave such variances; of a sort that is not known, of the one before."""
+        each = np.stack([np.interp(variance / (self.process + self.own), SHARES, one) for one in self.stretch])
+        return each[np.minimum(sorts, len(each) - 1), np.arange(len(sorts))]
 
 
 class Part(NamedTuple):
@@ -122,7 +123,11 @@ def matern(distance: np.ndarray) -> np.ndarray:
 
 
 def kriging(
-    places: Float[np.ndarray, "n d"], rest: Float[np.ndarray, "n c"], noise: Float[np.ndarray, " n"], seed: int = 0
+    places: Float[np.ndarray, "n d"],
+    rest: Float[np.ndarray, "n c"],
+    noise: Float[np.ndarray, " n"],
+    sorts: Int[np.ndarray, " n"],
+    seed: int = 0,
 ) -> Kriging:
     """Learn how values vary, and how far the errors of predictions hold.
 
@@ -130,6 +135,7 @@ def kriging(
         places: Where values are known, in scales of about 1; repeats are allowed.
         rest: The values, around 0.
         noise: Variance of the noise of each, positive.
+        sorts: Of each place, from 0: errors may be stretched by other factors in each.
         seed: Of the places that are looked at.
     """
     rng = np.random.default_rng(seed)
@@ -147,9 +153,10 @@ def kriging(
 
     found = minimize(cost, begin, method="Nelder-Mead", options={"maxiter": 300, "xatol": 0.02, "fatol": 0.05})
     size = np.exp(np.clip(found.x, low, high))
-    lengths, plain = size[:-2], np.ones(len(SHARES))
+    lengths, plain = size[:-2], np.ones((int(sorts.max()) + 1, len(SHARES)))
     learnt = Kriging(places / lengths, rest, noise, lengths, float(size[-2]), float(size[-1]), plain)
-    return dataclasses.replace(learnt, stretch=_stretch(learnt, rng))
+    each = [_stretch(learnt, rng.permutation(np.flatnonzero(sorts == one))[:TESTED]) for one in range(len(plain))]
+    return dataclasses.replace(learnt, stretch=np.stack(each))
 
 
 def _blocks(places: np.ndarray, rng: np.random.Generator) -> list[np.ndarray]:
@@ -171,9 +178,8 @@ def _surprise(at: np.ndarray, rest: np.ndarray, noise: np.ndarray, process: floa
     return half * rest.shape[1] + 0.5 * float(np.sum(rest * cho_solve(factor, rest, check_finite=False)))
 
 
-def _stretch(k: Kriging, rng: np.random.Generator) -> np.ndarray:
+def _stretch(k: Kriging, tests: Int[np.ndarray, " t"]) -> Float[np.ndarray, " 4"]:
     """Of errors at `SHARES`: 95 % of what is left out lies within 1.96 of them."""
-    tests = rng.permutation(len(k.places))[:TESTED]
     shares, misses = [], []
     for place in tests:
         away = np.linalg.norm(k.places - k.places[place], axis=1)

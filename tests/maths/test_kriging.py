@@ -17,8 +17,8 @@ def test_predictions_are_those_of_the_whole_covariance() -> None:
     rng = np.random.default_rng(0)
     known, asked = rng.uniform(size=(NEIGHBOURS, 2)), rng.uniform(size=(5, 2))
     noise, y = rng.uniform(0.01, 0.1, NEIGHBOURS), rng.normal(size=(NEIGHBOURS, 1))
-    k = Kriging(known, y, noise, np.ones(2), 2.0, 0.3, np.ones(4))
-    (part,) = k.predicted(asked)
+    k = Kriging(known, y, noise, np.ones(2), 2.0, 0.3, np.ones((1, 4)))
+    (part,) = k.predicted(asked, np.zeros(5, int))
 
     def covariance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         q = np.sqrt(3.0) * np.sqrt(((a[:, None] - b[None]) ** 2).sum(axis=-1))
@@ -37,11 +37,11 @@ def test_sizes_and_errors_are_those_of_the_field() -> None:
     places = rng.uniform(size=(700, 2)) * 2.0
     y = field(places, lengths, rng)
     noise = np.full(500, 0.05**2)
-    k = kriging(places[:500], y[:500] + 0.05 * rng.normal(size=(500, 3)), noise)
+    k = kriging(places[:500], y[:500] + 0.05 * rng.normal(size=(500, 3)), noise, np.zeros(500, int))
     assert k.lengths == pytest.approx(lengths, rel=0.5)
     assert 0.4 < k.process < 2.5  # which trades off with the lengths
     assert k.own < 0.02
-    (part,) = k.predicted(places[500:])
+    (part,) = k.predicted(places[500:], np.zeros(200, int))
     error = np.einsum("mk,mkc->mc", part.weights, k.rest[part.near]) - y[500:]
     assert 0.92 < np.mean(np.abs(error) < 1.96 * part.sd[:, None]) < 0.995
     assert np.sqrt(np.mean(error**2)) < 0.35 * np.std(y)
@@ -52,8 +52,24 @@ def test_errors_are_stretched_where_neighbours_mislead() -> None:
     rng = np.random.default_rng(2)
     places = rng.uniform(size=(600, 1)) * 10.0
     y = field(places, np.ones(1), rng, 1) * np.where(places < 7.5, 0.05, 1.0)
-    k = kriging(places[:400], y[:400], np.full(400, 1e-6))
+    k = kriging(places[:400], y[:400], np.full(400, 1e-6), np.zeros(400, int))
     assert k.stretch.max() > 1.2
-    (part,) = k.predicted(places[400:])
+    (part,) = k.predicted(places[400:], np.zeros(200, int))
     error = (part.weights * k.rest[part.near, 0]).sum(axis=1) - y[400:, 0]
     assert np.mean(np.abs(error) < 1.96 * part.sd) > 0.92
+
+
+def test_each_sort_of_place_has_a_stretch_of_its_own() -> None:
+    """Of the same field, errors are stretched on the restless side only; an unknown sort is judged as the last."""
+    rng = np.random.default_rng(2)
+    places = rng.uniform(size=(600, 1)) * 10.0
+    y = field(places, np.ones(1), rng, 1) * np.where(places < 7.5, 0.05, 1.0)
+    sorts = (places[:, 0] >= 7.5).astype(int)
+    k = kriging(places[:400], y[:400], np.full(400, 1e-6), sorts[:400])
+    assert k.stretch[0] == pytest.approx(np.ones(4))
+    assert k.stretch[1].max() > 1.4
+    (part,) = k.predicted(places[400:], sorts[400:])
+    error = np.abs((part.weights * k.rest[part.near, 0]).sum(axis=1) - y[400:, 0])
+    assert np.mean((error < 1.96 * part.sd)[sorts[400:] == 1]) > 0.85
+    (same,) = k.predicted(places[400:], 5 * sorts[400:])
+    assert (same.sd == part.sd).all()
