@@ -75,8 +75,7 @@ def completed(measurements: Measurements, out: Path, model: str, say: Progress, 
         part = measurements.rows(np.random.default_rng(0).permutation(measurements.n_samples)[:FITTED])
     say(f"fitting {names[0]}", 0, 0)
     posterior = laplace(fit(part, names[0]), seed=0)
-    say(f"inferring {len(directions[0])} rows", 0, 0)
-    return posterior.complete(*directions, measurements)
+    return posterior.complete(*directions, measurements, say)
 
 
 def completion(m: Measurements) -> str:

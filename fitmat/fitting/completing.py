@@ -11,6 +11,7 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float, Int
 
+from fitmat._types import Progress
 from fitmat.errors import ModelError
 from fitmat.fitting.correlation import places
 from fitmat.fitting.result import Fit
@@ -56,6 +57,7 @@ def completed(
     wi: Float[np.ndarray, "m 3"],
     wo: Float[np.ndarray, "m 3"],
     measured: Measurements | None = None,
+    progress: Progress | None = None,
 ) -> Measurements:
     """The measurements with more rows: of `wi` and `wo`, inferred.
 
@@ -65,6 +67,7 @@ def completed(
         wi: Directions to the light, of what is to be inferred.
         wo: Directions to the sensor.
         measured: All that was measured, where the fit saw a part of it.
+        progress: Called now and then with rows done and expected.
 
     Returns:
         Rows in which every channel is valid as they were, with the noise as σ; then rows in which some channel was
@@ -83,7 +86,7 @@ def completed(
     wi, wo = (np.concatenate([w[partly], asked]) for w, asked in ((m.wi, wi), (m.wo, wo)))
     sigma = _noise(fit, m)
     known = m.rows(np.flatnonzero(whole))
-    value, sd = _inferred(fit, draws, known, sigma[whole], wi, wo)
+    value, sd = _inferred(fit, draws, known, sigma[whole], wi, wo, progress or (lambda *_: None))
     kept = m.valid[partly]
     value[: len(kept)] = np.where(kept, m.value[partly], value[: len(kept)])
     sd[: len(kept)] = np.where(kept, sigma[partly], sd[: len(kept)])
@@ -112,7 +115,7 @@ def _noise(fit: Fit, m: Measurements) -> Float[np.ndarray, "n c"]:
 
 
 def _inferred(
-    fit: Fit, draws: np.ndarray, known: Measurements, sigma: np.ndarray, wi: np.ndarray, wo: np.ndarray
+    fit: Fit, draws: np.ndarray, known: Measurements, sigma: np.ndarray, wi: np.ndarray, wo: np.ndarray, say: Progress
 ) -> tuple[Float[np.ndarray, "m c"], Float[np.ndarray, "m c"]]:
     """Values and standard deviations, sr⁻¹."""
     kappa, there_kappa = (np.sqrt(light[:, 2:3] * sensor[:, 2:3]) for light, sensor in ((known.wi, known.wo), (wi, wo)))
@@ -133,6 +136,7 @@ def _inferred(
     at_known = scale.of(values(fit.model, draws, known.wi, known.wo) * kappa) - (scale.of(x) - rest)
     at_known = np.moveaxis(at_known, 0, 1).reshape(len(x), -1)
     for part in learnt.predicted(_places(fit, wi, wo), _sorts(wi, wo)):
+        say("inferring", part.some.start, len(wi))
         z[part.some] += _carried(learnt.rest, part.near, part.weights)
         there = values(fit.model, draws, wi[part.some], wo[part.some]) * there_kappa[part.some]
         moved = np.moveaxis(scale.of(there) - before[part.some], 0, 1)

@@ -6,6 +6,7 @@ It repairs nothing and drops nothing; what it cannot know it asks for.
 import dataclasses
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Protocol, cast, runtime_checkable
 
 import numpy as np
@@ -41,6 +42,7 @@ from fitmat.measurements.plausible_values import refuse_implausible, with_doubts
 from fitmat.measurements.quantity import factor, note
 from fitmat.measurements.samples import Measurements
 from fitmat.measurements.scale import of_unknown_scale
+from fitmat.measurements.writing import marks
 
 FORMATS: tuple[Any, ...] = (rgl, merl, zemax, lighttools, fred, astm, alta, ssdd, road, pab_opto, utia)
 """Rooms of one format each, asked in this order: `claims(head, size)` says whether a file is theirs, `load(path)` makes
@@ -241,7 +243,19 @@ def _of_file(
         room = next((room for room in (parquet, excel) if room.claims(head, size)), cells)
         return tabular.recording(room.load(path), columns, options)
     _refuse_needless(contents.name(path), layout.__name__.rpartition(".")[2], columns, options)
-    return layout.load(path)
+    return _with_marks(layout.load(path), Path(path))
+
+
+def _with_marks(recording: Recording, path: Path) -> Recording:
+    """The recording; where a file beside it tells what was inferred in it, with a warning that says so."""
+    beside = marks(path)
+    if beside is None or not beside.exists():
+        return recording
+    told = (
+        f"{contents.shown(beside.name)} beside this file says that some of its values were inferred, not measured. "
+        "Read that one, of which only what was measured is used."
+    )
+    return dataclasses.replace(recording, warnings=(*recording.warnings, told))
 
 
 def _refuse_needless(name: str, layout: str, columns: str | Mapping[str, str | int] | None, options: Options) -> None:

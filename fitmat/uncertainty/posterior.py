@@ -16,6 +16,7 @@ import polars as pl
 from jaxtyping import Float
 
 from fitmat import arguments
+from fitmat._types import Progress
 from fitmat.errors import OutputError
 from fitmat.extras import needed
 from fitmat.fitting.completing import completed
@@ -232,6 +233,7 @@ class Posterior:
         wi: Float[np.ndarray, "m 3"],
         wo: Float[np.ndarray, "m 3"],
         measurements: Measurements | None = None,
+        progress: Progress | None = None,
     ) -> Measurements:
         """What was measured, with more rows for directions that were not: the model, and what it misses nearby.
 
@@ -239,6 +241,7 @@ class Posterior:
             wi: Unit vectors to the light, of the rows to infer.
             wo: Unit vectors to the sensor.
             measurements: All that was measured, where the fit saw a part of it.
+            progress: Called now and then with rows done and expected.
 
         Returns:
             Measured rows unchanged, with their noise as σ; inferred ones marked by `inferred`, σ their standard
@@ -251,7 +254,9 @@ class Posterior:
             found = arguments.numbers(name, w)
             if found.ndim != 2 or found.shape[1] != 3 or not (found[:, 2] > 0).all():
                 arguments.refuse(name, w, "unit vectors above the surface, (m, 3)")
-        return completed(self.fit, self.values, np.asarray(wi, float), np.asarray(wo, float), measurements)
+        arguments.function("progress", progress)
+        pair = np.asarray(wi, float), np.asarray(wo, float)
+        return completed(self.fit, self.values, *pair, measurements, progress)
 
     def table(self) -> pl.DataFrame:
         """The draws as a table: chain (walker), draw (step), each free parameter (and channel), discrepancy."""

@@ -19,6 +19,9 @@ EXAMPLE = 'columns="theta_i=Zenith,theta_o=3" (--columns)'
 _RIVALS = (VALUES, *ELEVATIONS.items(), ("wavelength", "channel"), ("phi", "phi_i"), ("phi", "phi_o"), ("sigma",))
 
 
+MARKS = ("valid", "invalid", "inferred", "wavelength", "channel")
+
+
 @dataclasses.dataclass(frozen=True)
 class Columns:
     """Where to find what: numbers are column positions from 0.
@@ -29,7 +32,7 @@ class Columns:
         sigmas: Channel → column of its σ; empty where there is none.
         references: Channel → column of the reading of a white panel in the same geometry; empty where there is none.
         reference_sigmas: Channel → column of that reading's σ.
-        marks: valid, invalid, wavelength, channel, where given.
+        marks: valid, invalid, inferred, wavelength, channel, where given.
         quantity: One of `QUANTITIES`, or "signal", which becomes "panel_ratio" by its reference.
         unused: The columns that play no part.
     """
@@ -55,7 +58,7 @@ def assign(table: Table, columns: str | Mapping[str, str | int] | None, quantity
     _refuse_angles(table, angles)
     kind, quantity = _quantity(table, found, quantity)
     values = {role.channel: column for role, column in found.items() if role.kind == kind}
-    marks = {k: found[Role(k)] for k in ("valid", "invalid", "wavelength", "channel") if Role(k) in found}
+    marks = {k: found[Role(k)] for k in MARKS if Role(k) in found}
     if len(values) > 1 and "" in values:
         raise ReadError(f"{table.source}: {kind} and {kind}_… columns, expected one kind. {_choose(kind)}")
     if len(marks.keys() & {"wavelength", "channel"}) + any(values) > 1:

@@ -43,6 +43,7 @@ ALIASES = {
     "channel": ("band",),
     "valid": (),
     "invalid": ("flag",),
+    "inferred": (),
 }
 """Our name → its aliases; letter case, separators, Greek letters, a final "angle" and units do not matter."""
 

@@ -56,6 +56,9 @@ def recorded(table: Table, layout: Columns, options: Options, *, doubted: bool) 
     scale = _scale(table, layout, options)
     value, sigma = _stacked(table, layout.values), _stacked(table, layout.sigmas) if layout.sigmas else None
     doubts = {"flagged invalid": np.broadcast_to(_flagged(table, layout.marks)[:, None], value.shape)}
+    if "inferred" in layout.marks:
+        inferred = np.nan_to_num(table.truths(layout.marks["inferred"])) != 0
+        doubts |= {"inferred, not measured": np.broadcast_to(inferred[:, None], value.shape)}
     doubts |= sentinels(value)
     value, sigma = scales.plain(value, sigma, scale)
     if layout.quantity == "signal":

@@ -152,6 +152,14 @@ def test_invalid_cells_are_masked_and_no_value_is_clamped(standins):
     assert merl.load(standins[0]).value.min() == -1.66 / 1500
 
 
+def test_a_table_beside_a_file_tells_that_values_were_inferred(tmp_path):
+    (tmp_path / "small.binary").write_bytes(sample(np.random.default_rng(3)))
+    assert not reader.read(tmp_path / "small.binary").warnings
+    (tmp_path / "small.cells.parquet").write_bytes(b"")
+    (warning,) = reader.read(tmp_path / "small.binary").warnings
+    assert warning.startswith("small.cells.parquet beside this file says that some of its values were inferred")
+
+
 def test_four_times_as_many_azimuths_as_difference_angles_cover_a_whole_turn(tmp_path):
     """Source: the 90 × 90 × 360 files of the PQBA dataset (LIRIS), whose models are not reciprocal."""
     path = tmp_path / "full.binary"
