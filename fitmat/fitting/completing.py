@@ -22,6 +22,7 @@ from fitmat.maths.kriging import kriging
 from fitmat.measurements.noise import at_level, channel_laws
 from fitmat.measurements.samples import Measurements
 from fitmat.models.values import at, values, widths
+from fitmat.text import brief
 
 DRAWS, FEWEST_DRAWS, WORK = 64, 12, 20_000_000
 """Draws of a posterior that are carried over: the most, the fewest, and places × draws in between."""
@@ -42,6 +43,8 @@ class _Scale:
 
     noise: float
     s: float
+
+    __repr__ = brief
 
     def of(self, x: np.ndarray) -> np.ndarray:
         return stabilised(x, self.noise, self.s)

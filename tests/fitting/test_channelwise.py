@@ -9,7 +9,7 @@ import pytest
 from selection import always
 
 import fitmat as fm
-from fitmat.fitting import channelwise, information, linear, refining, starts
+from fitmat.fitting import channelwise, linear, refining, settling, starts
 from fitmat.fitting.channelwise import Part, apart, divides, layout
 from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.result import Fit
@@ -118,7 +118,7 @@ def test_fits_end_where_one_slope_for_each_parameter_leads(asked: str, monkeypat
     m, (to, told) = plastic(3), ASKED[asked]
     by_kind = fm.fit(m, to, **told)
     together = by_kind.linear
-    for room in (refining, information, linear):
+    for room in (refining, settling, linear):
         monkeypatch.setattr(room, "layout", lambda *_: None)
     close(by_kind, alone := fm.fit(m, to, **told))
     assert together is not None
