@@ -17,6 +17,7 @@ EXTRAS = {
     "fastexcel": "excel",
     "OpenEXR": "exr",
     "distributed": "cluster",
+    "zarr": "zarr",
 }
 """Package → the extra of fitmat that brings it."""
 

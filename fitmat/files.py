@@ -102,6 +102,28 @@ def alone(target: Path) -> Iterator[None]:
         yield
 
 
+@contextlib.contextmanager
+def replaced(folder: Path) -> Iterator[Path]:
+    """A folder to write into that takes the place of another of that name when the block ends well, in two renamings.
+
+    Raises:
+        OutputError: it cannot be written; what was there before is still there.
+    """
+    draft, old = (folder.with_name(f".{folder.name}.{what}") for what in ("new", "old"))
+    try:
+        _remove(draft)
+        yield draft
+        _remove(old)
+        if folder.exists():
+            os.replace(folder, old)
+        os.replace(draft, folder)
+        _remove(old)
+    except OSError as error:
+        raise OutputError(f"cannot write {folder}: {_reason(error)}; choose another place with --out.") from error
+    finally:
+        _remove(draft)
+
+
 def _work(target: Path) -> Path:
     """The folder in which `target` is made: beside it, or in it where it cannot be replaced as a whole."""
     place = Path(os.path.realpath(target))

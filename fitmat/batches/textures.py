@@ -17,8 +17,9 @@ import numpy as np
 
 from fitmat import arguments, files
 from fitmat._types import Progress
-from fitmat.batches.atlas import UNREADABLE, Atlas, read_atlas, unpacked
+from fitmat.batches.atlas import UNREADABLE, ZARR, Atlas, read_atlas, unpacked
 from fitmat.batches.maps import maps
+from fitmat.extras import needed
 from fitmat.fitting.losses import DEFAULT, loss
 from fitmat.fitting.many.concluding import OUTCOMES
 from fitmat.fitting.many.fits import Fits
@@ -26,8 +27,8 @@ from fitmat.fitting.many.fitting_many import fit_many, shared_by_all
 from fitmat.models.values import slices
 from fitmat.text import brief
 
-RESULT, PARTS = "texture.npz", "parts"
-"""What a run leaves in its folder: the arrays of all points, and those of each tile by key."""
+RESULT, PARTS = "texture", "parts"
+"""What a run leaves in its folder: the arrays of all points, as .npz or .zarr, and those of each tile by key."""
 
 TILE = 16384
 """Points that are fitted, and kept, at a time."""
@@ -72,7 +73,7 @@ def fit_texture(
 
     Args:
         source: The atlas, as `read_atlas` takes it.
-        folder: For `texture.npz`, and what is kept to go on after an interruption.
+        folder: For `texture.npz` or `texture.zarr`, and what is kept to go on after an interruption.
         model: Name of the model.
         progress: Called with what is done, how many points are done, and how many there are.
         **told: `fixed`, `loss`, `masking`, `starts`, `max_steps` and `threads` of `fitmat.fit_many`.
@@ -89,13 +90,13 @@ def fit_texture(
     atlas, target, say = read_atlas(Path(source)), Path(folder), progress or (lambda *_: None)
     given = told.get("fixed") or {}, loss(told.get("loss", DEFAULT.name)), told.get("masking")
     shared, held = shared_by_all([atlas.wi, atlas.wo], len(atlas.channels), model, *given)
-    axes = atlas.value.shape[:-2]
+    axes = atlas.points
     count = int(np.prod(axes))
     tiles: list[dict[str, np.ndarray]] = []
     earlier = 0
     with files.alone(target):
         for part in slices(count, TILE):
-            value, sigma = _tile(atlas, part)
+            value, sigma = atlas.tile(part)
             kept = target / PARTS / f"{_key(atlas, value, sigma, model, told)}.npz"
             tile = _read(kept, len(value))
             if tile is None:
@@ -109,27 +110,17 @@ def fit_texture(
         whole = {name: np.concatenate([tile[name] for tile in tiles]) for name in KEPT}
         shaped: dict[str, Any] = {name: part.reshape(*axes, *part.shape[1:]) for name, part in whole.items()}
         fits = Fits(shared.template, atlas.channels, held, **shaped)
-        file = files.write_bytes(target / RESULT, _packed(_arrays(fits)))
+        file = _written(target / f"{RESULT}{Path(source).suffix.lower()}", _arrays(fits))
         drawn = [files.write_bytes(target / name, content) for name, content in maps(fits).items()]
         return Texture(file, tuple(drawn), fits, earlier)
 
 
-def _tile(atlas: Atlas, part: slice) -> tuple[np.ndarray, np.ndarray | None]:
-    """The values and the noise of some points."""
-
-    def some(every: np.ndarray) -> np.ndarray:
-        return every.reshape(-1, *every.shape[-2:])[part]
-
-    sigma = atlas.sigma
-    return some(atlas.value), sigma if sigma is None or sigma.ndim == 0 else some(sigma)
-
-
-def _key(atlas: Atlas, value: np.ndarray, sigma: np.ndarray | None, model: str, told: Mapping[str, Any]) -> str:
+def _key(atlas: Atlas, value: np.ndarray, sigma: np.ndarray | float | None, model: str, told: Mapping[str, Any]) -> str:
     """The name under which a tile is kept: of what is fitted, how, and by which fitmat."""
     how = {name: given for name, given in told.items() if name != "threads"} | {"model": model}
     words = json.dumps([how, version("fitmat"), value.shape], sort_keys=True, default=str)
     found = hashlib.sha256(words.encode())
-    for part in (value, np.zeros(0) if sigma is None else sigma, atlas.wi, atlas.wo):
+    for part in (value, np.zeros(0) if sigma is None else np.asarray(sigma), atlas.wi, atlas.wo):
         found.update(np.ascontiguousarray(part, float).tobytes())
     return found.hexdigest()[:32]
 
@@ -147,6 +138,19 @@ def _packed(arrays: Mapping[str, np.ndarray]) -> bytes:
     memory, named = io.BytesIO(), dict[str, Any](arrays)
     np.savez_compressed(memory, **named)
     return memory.getvalue()
+
+
+def _written(path: Path, arrays: Mapping[str, np.ndarray]) -> Path:
+    """The arrays as a .npz file, or as a Zarr group with words as attributes, in the place of what a run left there."""
+    if path.suffix != ZARR:
+        return files.write_bytes(path, _packed(arrays))
+    words = {name: part.tolist() for name, part in arrays.items() if part.dtype.kind == "U"}
+    with files.replaced(path) as draft:
+        group = needed("zarr", f"{path}: a Zarr group").open_group(str(draft), mode="w")
+        group.attrs.update(words)
+        for name in arrays.keys() - words.keys():
+            group.create_array(name, data=arrays[name])
+    return path
 
 
 def _arrays(fits: Fits) -> dict[str, np.ndarray]:

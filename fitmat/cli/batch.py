@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from fitmat.batches.atlas import SUFFIX
+from fitmat.batches.atlas import SUFFIXES
 from fitmat.batches.batch import PAGE, Batch, batch
 from fitmat.batches.textures import fit_texture
 from fitmat.cli import interrupts, process, session
@@ -55,7 +55,9 @@ def run(
     told, doing = dict(studying), dict(doing)
     models = told.pop("models")
     if (device := doing.pop("device")) != "cpu":
-        raise FitmatError(f"--device {device} for files, expected a texture (.npz): files are fitted on the CPU.")
+        raise FitmatError(
+            f"--device {device} for files, expected a texture (.npz, .zarr): files are fitted on the CPU."
+        )
     signal.signal(signal.SIGINT, signal.default_int_handler)
     if doing["scheduler"] is not None:
         logging.disable(logging.ERROR)  # Dask tells at length what becomes one sentence
@@ -70,7 +72,7 @@ def run(
 
 def is_texture(sources: Sequence[Path]) -> bool:
     """Whether what is given is one texture, and not files of measurements."""
-    return len(sources) == 1 and sources[0].suffix.lower() == SUFFIX
+    return len(sources) == 1 and sources[0].suffix.lower() in SUFFIXES
 
 
 def texture(

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import zarr
 from PIL import Image
 from typer.testing import CliRunner
 
@@ -84,6 +85,34 @@ def test_an_atlas_is_fitted_as_its_arrays_are(atlas: Path, tmp_path: Path) -> No
     steps = np.diff(np.nanmean(direct["alpha"], axis=0))
     np.testing.assert_allclose(steps, 0.1, atol=0.02)  # the roughness of the truth, 1 % noise
     assert "11 converged, 1 too_few" in str(found)
+
+
+def zarr_group(path: Path) -> Path:
+    """The same texture, chunks of a row; the names of its channels are an attribute."""
+    group = zarr.open_group(path, mode="w")
+    for name, part in arrays().items():
+        group.create_array(name, data=part, chunks=(1, *part.shape[1:]) if part.ndim else ())
+    group.attrs["channels"] = ["grey"]
+    return path
+
+
+def test_a_zarr_group_is_read_and_left_as_one(atlas: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tiles begin and end within rows; what an earlier run left is replaced."""
+    monkeypatch.setattr(textures, "TILE", 5)
+    expected = fit_texture(atlas, tmp_path / "npz", **TOLD).fits
+    source = zarr_group(tmp_path / "atlas.zarr")
+    read = read_atlas(source)
+    assert not isinstance(read.value, np.ndarray)
+    assert max(len(read.tile(slice(first, first + 5))[0]) for first in range(0, 12, 5)) == 5
+    for _ in range(2):
+        found = fit_texture(source, tmp_path / "out", **TOLD)
+        np.testing.assert_array_equal(found.fits.values, expected.values)
+        kept: Any = zarr.open_group(tmp_path / "out" / "texture.zarr", mode="r")
+        np.testing.assert_array_equal(kept["alpha"], expected["alpha"])
+        np.testing.assert_array_equal(kept["kd_sd"], expected.sd_of("kd"))
+        assert kept.attrs["channels"] == ["grey"]
+        assert kept.attrs["outcomes"][kept["outcome"][1, 2]] == "too_few"
+    assert not [path for path in (tmp_path / "out").iterdir() if path.name.startswith(".texture")]
 
 
 @pytest.mark.parametrize("end", [KeyboardInterrupt, MemoryError])
@@ -215,6 +244,27 @@ def test_wrong_arrays_are_one_sentence(changed, message, tmp_path: Path) -> None
         read_atlas(path)
 
 
+def test_damaged_groups_are_one_sentence(tmp_path: Path) -> None:
+    """None there, a file, words for numbers, and a chunk that is cut off, which is met while points are fitted."""
+    path = tmp_path / "atlas.zarr"
+    with pytest.raises(FitmatError, match=r"atlas\.zarr: no atlas can be read \(.*does not exist\)"):
+        read_atlas(path)
+    path.write_text("theta_i,theta_o\n")
+    with pytest.raises(FitmatError, match=r"atlas\.zarr: no atlas can be read"):
+        read_atlas(path)
+    path.unlink()
+    zarr.open_group(path, mode="w").create_array("value", data=np.zeros((2, 3, 1), bool))
+    with pytest.raises(FitmatError, match=r"value of .*atlas\.zarr .* real numbers"):
+        read_atlas(path)
+    shutil.rmtree(path)
+    chunk = max((one for one in zarr_group(path).glob("value/c/1/**/*") if one.is_file()), key=str)
+    chunk.write_bytes(chunk.read_bytes()[:20])
+    read = read_atlas(path)
+    assert np.isfinite(read.tile(slice(0, COLUMNS))[0]).all()
+    with pytest.raises(FitmatError, match=r"atlas\.zarr: points 5 to 8 cannot be read \(.*\)\. Write it again"):
+        read.tile(slice(COLUMNS, 2 * COLUMNS))
+
+
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04 damaged", b"\x93NUMPY", b"theta_i,theta_o\n"])
 def test_damaged_files_are_one_sentence(content, tmp_path: Path) -> None:
     path = tmp_path / "atlas.npz"
@@ -226,7 +276,7 @@ def test_damaged_files_are_one_sentence(content, tmp_path: Path) -> None:
 def test_vectors_serve_as_angles_do(atlas: Path, tmp_path: Path) -> None:
     by_angle = read_atlas(atlas)
     path = tmp_path / "vectors.npz"
-    np.savez(path, value=by_angle.value, wi=by_angle.wi, wo=by_angle.wo)
+    np.savez(path, value=arrays()["value"], wi=by_angle.wi, wo=by_angle.wo)
     found = read_atlas(path)
     np.testing.assert_array_equal(found.wo, by_angle.wo)
     assert found.sigma is None

@@ -12,7 +12,7 @@ SourcesFlag = Annotated[
     list[Path] | None,
     typer.Argument(
         help="Files of measurements, folders of them, or patterns in quotes ('scans/*.csv'), in any format that fit "
-        "reads; or one texture (.npz).",
+        "reads; or one texture (.npz, .zarr).",
         show_default=False,
     ),
 ]
