@@ -29,6 +29,9 @@ SUFFIXES = (".npz", ZARR)
 ANGLES = ("theta_i", "theta_o", "phi_i", "phi_o")
 """Arrays of angles in degrees, in place of wi and wo."""
 
+RADIANS = 0.1, 1.6
+"""Largest zenith angle between which angles that should be degrees look like radians."""
+
 KNOWN = ("value", "sigma", "wi", "wo", *ANGLES, "channels")
 """Arrays that an atlas may hold."""
 
@@ -86,15 +89,17 @@ class Atlas:
         """The values and the noise of some points, counted row by row.
 
         Raises:
-            ReadError: they cannot be read.
+            ReadError: they cannot be read, or a sigma is not positive.
         """
         try:
-            value = _some(self.value, part)
-            sigma = self.sigma
-            return value, sigma if sigma is None or isinstance(sigma, float | int) else _some(sigma, part)
+            value, sigma = _some(self.value, part), self.sigma
+            sigma = sigma if sigma is None or isinstance(sigma, float | int) else _some(sigma, part)
         except (*UNREADABLE, RuntimeError) as error:
             where = f"{self.source}: points {part.start + 1} to {part.stop}"
             raise ReadError(f"{where} cannot be read ({visible(str(error))}). Write it again.") from error
+        if sigma is not None and (np.asarray(sigma) <= 0).any():
+            raise ReadError(f"{self.source}: sigma of {np.nanmin(sigma):g}, expected above 0, or NaN to mask a value.")
+        return value, sigma
 
 
 def _some(every: Sliced, part: slice) -> Float[np.ndarray, "m n c"]:
@@ -188,6 +193,10 @@ def _directions(path: Path, found: Mapping[str, np.ndarray]) -> tuple[np.ndarray
     if vectors or not {"theta_i", "theta_o"} <= set(angles):
         got = ", ".join([*vectors, *angles]) or "none"
         raise ReadError(f"{path}: directions {got}, expected wi and wo, or theta_i and theta_o (degrees).")
+    most = max(float(np.nanmax(np.abs(found[name]), initial=0.0)) for name in ("theta_i", "theta_o"))
+    if RADIANS[0] < most <= RADIANS[1]:
+        got = f"no zenith angle exceeds {most:.3g}, expected degrees; they look like radians"
+        raise ReadError(f"{path}: {got}. Convert them, or give wi and wo.")
     told = {"phi_i": np.zeros(()), "phi_o": np.full((), 180.0)} | {name: found[name] for name in angles}
     try:
         theta_i, theta_o, phi_i, phi_o = np.broadcast_arrays(*(np.atleast_1d(told[name]) for name in ANGLES))

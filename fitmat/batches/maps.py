@@ -6,7 +6,7 @@ Numbers are renamed, none is imitated: a point's material is glTF's with the sam
 import io
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from fitmat.colour.spaces import encoded
 from fitmat.exports import gltf
@@ -22,7 +22,7 @@ LEVELS = 255.0
 ABOUT = (
     "Parameters of a fit by their glTF names: baseColor is kd (sRGB), roughness is sqrt(alpha) (green, linear), "
     "metallic is 0, and F0 is ks times the Fresnel term's (sRGB, relative to the index of refraction). glTF's diffuse "
-    "part is lessened by 1 - F, the fit's is not. Points without a fit have the texture's median.",
+    "part is lessened by 1 - F, the fit's is not. Points without a fit that is determined have the texture's median.",
     gltf.VIEWERS,
 )
 
@@ -33,11 +33,12 @@ def maps(fits: Fits) -> dict[str, bytes]:
     level = next((name for name in ("f0", "eta") if name in names), None)
     if fits.outcome.ndim != 2 or len(fits.channels) not in (1, 3) or level is None or not {"kd", "alpha"} <= names:
         return {}
-    if not np.isfinite(fits["alpha"]).any():
+    fitted = np.isfinite(fits["alpha"]) & np.isin(fits.result, ("converged", "at_bound", "max_steps"))
+    if not fitted.any():
         return {}
     reflected = fits[level] if level == "f0" else f0_from_eta(fits[level])
     f0 = _coloured(reflected) * (_coloured(fits["ks"]) if "ks" in names else 1.0)
-    base, rough, f0 = (_filled(part) for part in (_coloured(fits["kd"]), _coloured(np.sqrt(fits["alpha"])), f0))
+    base, rough, f0 = (_filled(part, fitted) for part in (_coloured(fits["kd"]), _coloured(np.sqrt(fits["alpha"])), f0))
     most = float(np.clip(f0.max(), 1e-4, gltf.MOST_F0))
     packed = np.stack([np.zeros(rough.shape[:2]), rough[..., 1], np.zeros(rough.shape[:2])], axis=-1)
     return {
@@ -54,8 +55,10 @@ def _coloured(part: np.ndarray) -> Float[np.ndarray, "rows columns 3"]:
     return np.broadcast_to(shaped, (*shaped.shape[:2], 3))
 
 
-def _filled(part: Float[np.ndarray, "rows columns 3"]) -> Float[np.ndarray, "rows columns 3"]:
-    return np.where(np.isfinite(part), part, np.nanmedian(part, axis=(0, 1)))
+def _filled(
+    part: Float[np.ndarray, "rows columns 3"], fitted: Bool[np.ndarray, "rows columns"]
+) -> Float[np.ndarray, "rows columns 3"]:
+    return np.where(fitted[..., None], part, np.median(part[fitted], axis=0))
 
 
 def _png(values: Float[np.ndarray, "rows columns 3"]) -> bytes:

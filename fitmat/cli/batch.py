@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import polars as pl
 from rich.console import Console
 from rich.table import Table
@@ -58,6 +59,8 @@ def run(
         raise FitmatError(
             f"--device {device} for files, expected a texture (.npz, .zarr): files are fitted on the CPU."
         )
+    if odd := next((source for source in sources if is_texture([source])), None):
+        raise FitmatError(f"{odd}: a texture beside other files, expected it alone. Give one texture at a time.")
     signal.signal(signal.SIGINT, signal.default_int_handler)
     if doing["scheduler"] is not None:
         logging.disable(logging.ERROR)  # Dask tells at length what becomes one sentence
@@ -119,6 +122,13 @@ def texture(
         raise SystemExit(interrupts.INTERRUPTED) from None
     drawn = f"\nMaps: {', '.join(path.name for path in found.maps)}" if found.maps else ""
     process.say(f"{found}\n\nArrays: {found.file}{drawn}")
+    measured = found.fits.result != "too_few"
+    ended = np.count_nonzero(found.fits.result[measured] != "converged")
+    if ended or not measured.any():
+        count = found.fits.result.size
+        got = f"{ended} of {count} points are not determined or did not converge" if ended else "no point has a fit"
+        process.say(f"fitmat: {got}: see outcome there. Are value, sigma and the model what you mean?", err=True)
+        raise SystemExit(process.NOT_CONVERGED)
 
 
 def show(found: Batch, screen: Console | None = None) -> None:

@@ -122,9 +122,14 @@ def energies(folder: str, illuminant: str) -> None:
             continue
         own, any_found = energy_of(one, illuminant=illuminant), True
         table = Table("alpha", "", *(f"{angle:.0f}°" for angle in np.rad2deg(own.theta)), box=None, pad_edge=False)
-        for found in (own, *(energy_of(one, alpha=alpha, illuminant=illuminant) for alpha in ALPHAS)):
+        others = [alpha for alpha in ALPHAS if f"{alpha:.3g}" != f"{own.alpha:.3g}"]
+        for found in (own, *(energy_of(one, alpha=alpha, illuminant=illuminant) for alpha in others)):
             for way, apart in found.delta_e_2000.items():
-                table.add_row(f"{found.alpha:.3g}", WAYS[way], *(f"{value:.1f}" for value in apart))
+                table.add_row(
+                    f"{found.alpha:.3g}{' (fitted)' if found is own else ''}",
+                    WAYS[way],
+                    *(f"{value:.1f}" for value in apart),
+                )
         _say(out, f"{visible(own.sentence)}\n")
         out.print(table)
     if any_found:

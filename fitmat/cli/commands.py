@@ -194,7 +194,7 @@ def convert(
     reading: dict[str, Any],
     out: ConvertedFlag,
     complete: CompleteFlag = False,
-    model: FillingFlag = "lambert+ggx",
+    model: FillingFlag = None,
     force: ReplaceFlag = False,
 ) -> None:
     """Write measurements in another format; what that cannot hold is said."""
@@ -202,7 +202,7 @@ def convert(
     from fitmat.cli import convert, session
 
     with session.watch() as watch:
-        told = convert.written(files, reading, out, watch, force=force, model=model if complete else None)
+        told = convert.written(files, reading, out, watch, force=force, complete=complete, model=model)
     process.say("\n".join([*told, visible(str(out))]))
 
 

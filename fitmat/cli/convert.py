@@ -17,6 +17,12 @@ from fitmat.measurements.reader import read
 from fitmat.measurements.samples import Measurements
 from fitmat.text import visible
 
+FILLING = "lambert+ggx"
+"""What fills gaps, where the user names no model."""
+
+UNKNOWN = 0.5
+"""Share of a value from which on its sd leaves it unknown."""
+
 FITTED = 20_000
 """Rows to which the model is fitted, at most; what it misses is carried over from all."""
 
@@ -28,6 +34,7 @@ def written(
     say: Progress,
     *,
     force: bool,
+    complete: bool = False,
     model: str | None = None,
 ) -> list[str]:
     """Write the measurements of files to another; what they are, and what that cannot hold, as lines.
@@ -38,15 +45,18 @@ def written(
         out: To write; its ending names the format.
         say: Called with what is done next.
         force: Whether to replace it.
-        model: What fills the gaps; None for leaving them.
+        complete: Whether to fill what was not measured.
+        model: What fills it; None for `FILLING`.
 
     Raises:
-        FitmatError: as `fitmat.read` and `fitmat.write`, or nothing can be completed.
+        FitmatError: as `fitmat.read` and `fitmat.write`, nothing can be completed, or a model has nothing to fill.
     """
+    if model is not None and not complete:
+        raise ModelError(f"--model {model} without --complete, for which it would fill gaps. Leave it out, or add it.")
     measurements = read(sources, **reading)
     told = [str(measurements)]
-    if model is not None:
-        measurements = completed(measurements, out, model, say, force=force)
+    if complete:
+        measurements = completed(measurements, out, model or FILLING, say, force=force)
         told += [completion(measurements)]
         if (beside := writing.marks(out)) is not None:
             told += [f"Which of them were inferred, and how well each is known: {visible(str(beside))}"]
@@ -82,6 +92,11 @@ def completion(m: Measurements) -> str:
     """How much was inferred, and how well it is known, as a sentence."""
     inferred = np.zeros(m.n_samples, bool) if m.inferred is None else m.inferred
     sd = np.zeros((1, 1)) if m.sigma is None else m.sigma[inferred]
-    relative = 100.0 * np.quantile(sd / np.maximum(m.value[inferred], 1e-300), [0.5, 0.9])
+    value = m.value[inferred]
+    relative = np.where(sd < value, sd / np.where(value > 0.0, value, 1.0), 1.0)
     rows = f"{np.count_nonzero(~inferred)} rows as measured, {np.count_nonzero(inferred)} inferred"
-    return f"{rows}, half of them to within {relative[0]:.2g} % (sd), nine of ten to within {relative[1]:.2g} %."
+    half, most = (f"{100.0 * share:.2g} %" for share in np.quantile(relative, [0.5, 0.9]))
+    if (lost := np.mean(relative > UNKNOWN)) > 0.1:
+        got = f"WARNING: {100.0 * lost:.0f} % of them are known to no better than half of their value"
+        return f"{rows}. {got}: the readings do not say what --model should be there. Try another, or measure more."
+    return f"{rows}, half of them to within {half} (sd), nine of ten to within {most}."

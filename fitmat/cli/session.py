@@ -64,7 +64,7 @@ class Watch:
 
     def compiling(self, what: str) -> None:
         """Say that a program is compiled, which happens once."""
-        words = f"compiling {what}, once for this machine"
+        words = f"compiling {what or 'what models share'}, once for this machine"
         if self._bar is not None:
             self._bar.update(self._task, description=f"{self._stage}: {words}" if self._stage else words, refresh=True)
         elif words not in self._told:

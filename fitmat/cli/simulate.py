@@ -71,14 +71,20 @@ def truth(
     count = max((v.size for v in values.values()), default=1) if nm is None else len(nm)
     channels = default_channels(count) if nm is None else tuple(f"{x:.10g}" for x in nm)
     if dispersion is not None:
-        if nm is None or ior is not None or film is not None:
-            got = "without --wavelengths" if nm is None else "beside --ior or --film, which say an index already"
-            raise ModelError(f"--dispersion {dispersion} {got}. Give wavelengths, and one of the three.")
+        if nm is None:
+            raise ModelError(
+                f"--dispersion {dispersion} without --wavelengths, expected where the channels are. Add it."
+            )
+        if ior is not None or film is not None:
+            got = f"--dispersion {dispersion} beside {'--film' if ior is None else '--ior'}"
+            raise ModelError(f"{got}, which says an index already: expected one of them. Leave one out.")
         return _lawful(name, values, masking, channels, dispersion), channels
     held: dict[str, np.ndarray] = {}
     if ior is not None:
         ((name, held),) = of_material(name, ior, channels).items()
     if film is not None:
+        if nm is None and "-film" in name:
+            raise ModelError(f"--film {film} without --wavelengths, expected where the channels are. Add it.")
         made = of_film(name, film, channels)
         refuse_no_film(film, {name: made})
         held = held | made
@@ -100,7 +106,15 @@ def _lawful(
     arguments.choice("dispersion", law, LAWS)
     own = {field.name for field in dataclasses.fields(LAWS[law]) if "param" in field.metadata}
     given = {k: v[0] if v.size == 1 else v for k, v in values.items() if k not in own}
-    built = dispersed(model(name, masking=masking, channels=len(channels), **given), law, channels)
+    try:
+        plain = model(name, masking=masking, channels=len(channels), **given)
+    except ModelError as error:
+        raise ModelError(f"{error} The law {law} has {', '.join(sorted(own))}.") from error
+    built = dispersed(plain, law, channels)
+    left = {entry.name for entry in entries(built)}
+    if lost := sorted(given.keys() & ({entry.name for entry in entries(plain)} - left)):
+        got = f"--set {lost[0]} beside --dispersion {law}, whose law says it"
+        raise ModelError(f"{got}: expected any of {', '.join(e.name for e in entries(built))}. Set those.")
     told = np.array(vector(built), float)
     for entry in entries(built):
         if entry.name in own & values.keys():

@@ -43,7 +43,9 @@ def gaps(m: Measurements) -> Directions:
     filled[i.ravel()[some], o.ravel()[some]] = True
     filled |= (np.cos(lights[:, :1]) < 1e-6) | (np.cos(sensors[:, 0]) < 1e-6)
     if filled.all() and m.valid[some].all():
-        raise OutputError(f"{m.source}: nothing to complete: every direction of its grid was measured. Leave it out.")
+        raise OutputError(
+            f"{m.source}: nothing to complete: every direction of its grid was measured. Leave --complete out."
+        )
     a, b = np.nonzero(~filled)
     theta_i, phi_i, theta_o = lights[a, 0], lights[a, 1], sensors[b, 0]
     return from_angles(theta_i, phi_i), from_angles(theta_o, phi_i + sensors[b, 1])

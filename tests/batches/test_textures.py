@@ -223,6 +223,10 @@ UP = np.tile([0.0, 0.0, 1.0], (SAMPLES, 1))
         ({"values": np.ones(3)}, "an array 'values', expected value and any of sigma"),
         ({"value": np.ones((4, 24))}, r"value has shape \(4, 24\), expected \(rows, columns, samples, channels\) or"),
         ({"value": np.ones((4, 23, 1))}, "24 pairs of directions for 23 samples, expected as many"),
+        (
+            {"theta_i": np.array(0.5), "theta_o": np.linspace(-1.0, 1.2, SAMPLES)},
+            "1.2, expected degrees; they look like",
+        ),
         ({"value": np.array([["a"]])}, "value of .*atlas.npz"),
         ({"sigma": np.ones(3)}, r"sigma has shape \(3,\), expected one number, or"),
         ({"theta_o": None}, "directions theta_i, expected wi and wo, or theta_i and theta_o"),
@@ -242,6 +246,32 @@ def test_wrong_arrays_are_one_sentence(changed, message, tmp_path: Path) -> None
     np.savez(path, **kept)
     with pytest.raises(FitmatError, match=message):
         read_atlas(path)
+
+
+@pytest.mark.parametrize("sigma", [np.array(-0.01), np.full((ROWS, COLUMNS, SAMPLES, 1), -0.01)])
+def test_a_sigma_is_positive(sigma: np.ndarray, tmp_path: Path) -> None:
+    told: dict[str, Any] = arrays() | {"sigma": sigma}
+    np.savez(tmp_path / "atlas.npz", **told)
+    with pytest.raises(FitmatError, match=r"atlas\.npz: sigma of -0\.01, expected above 0"):
+        read_atlas(tmp_path / "atlas.npz").tile(slice(0, 3))
+
+
+def test_points_that_end_otherwise_end_the_command_with_3(tmp_path: Path) -> None:
+    """A point that was not measured is no failure; where none is left, or one is not determined, scripts are told."""
+    told: dict[str, Any] = arrays()
+    np.savez(tmp_path / "good.npz", **told)
+    np.savez(tmp_path / "none.npz", **(told | {"value": np.full_like(told["value"], np.nan)}))
+    np.savez(tmp_path / "flat.npz", **(told | {"value": np.zeros_like(told["value"]), "sigma": np.array(0.1)}))
+    asked = ["--loss", "gaussian", "--fix", "ks=1", "--fix", "eta=1.5"]
+    ended = {
+        name: CliRunner().invoke(app, ["batch", str(tmp_path / f"{name}.npz"), "--out", str(tmp_path / name), *asked])
+        for name in ("good", "none", "flat")
+    }
+    assert {name: one.exit_code for name, one in ended.items()} == {"good": 0, "none": 3, "flat": 3}
+    assert "no point has a fit" in ended["none"].output
+    assert "of 12 points are not determined or did not converge" in ended["flat"].output
+    beside = CliRunner().invoke(app, ["batch", str(tmp_path / "good.npz"), str(tmp_path / "none.npz")])
+    assert "a texture beside other files" in str(beside.exception)
 
 
 def test_damaged_groups_are_one_sentence(tmp_path: Path) -> None:

@@ -216,8 +216,11 @@ def test_convert_completes_a_table(run: Run, sparse: Path) -> None:
 
 def test_what_cannot_be_completed_is_one_sentence(run: Run, sparse: Path) -> None:
     whole = run("convert", sparse, "b.csv", "--complete")
-    assert_refused(whole, r"sparse\.csv: nothing to complete: every direction of its grid was measured\. Leave it out")
+    assert_refused(
+        whole, r"sparse\.csv: nothing to complete: every direction of its grid was measured\. Leave --complete out"
+    )
     assert_refused(run("convert", sparse, "b.csv", "--complete", "--model", "lambort"), "no lobe 'lambort'")
+    assert_refused(run("convert", sparse, "b.csv", "--model", "ggx"), "--model ggx without --complete")
     two = run("convert", sparse, "b.csv", "--complete", "--model", "lambert,ggx")
     assert_refused(two, r"--model lambert,ggx: 2 models, expected the one that fills the gaps")
     Path("few.csv").write_text("theta_i,theta_o,brdf\n10,10,1\n10,20,1\n20,10,1\n")

@@ -180,10 +180,19 @@ BAD_ARGUMENTS: dict[str, tuple[tuple[str, ...], str]] = {
     ),
     "wavelength twice": (("simulate", "ggx", "--wavelengths", "450,450"), "expected each wavelength once"),
     "no wavelengths": (("simulate", "ggx", "--wavelengths", "blue"), "expected a list 450,550,650 or FIRST:LAST:STEP"),
+    "film nowhere": (("simulate", "ggx-film", "--film", "TiO2", "--ior", "Ti"), "--film TiO2 without --wavelengths"),
+    "index beside a law": (
+        ("simulate", "ggx", "--dispersion", "cauchy", "--set", "eta=1.5", "--wavelengths", "450,550"),
+        "--set eta beside --dispersion cauchy, whose law says it: expected any of ks, alpha, cauchy_a, cauchy_b",
+    ),
+    "no such parameter of a law": (
+        ("simulate", "ggx", "--dispersion", "cauchy", "--set", "drude_ep=9", "--wavelengths", "450,550"),
+        "The law cauchy has cauchy_a, cauchy_b",
+    ),
     "law of nothing": (("simulate", "ggx", "--dispersion", "drude"), "--dispersion drude without --wavelengths"),
     "law and material": (
         ("simulate", "ggx", "--dispersion", "drude", "--ior", "Au", "--wavelengths", "450,550"),
-        "--dispersion drude beside --ior or --film",
+        "--dispersion drude beside --ior, which says an index already",
     ),
     "said by its material": (
         ("simulate", "ggx", "--ior", "Au", "--set", "kappa=2", "--wavelengths", "450,550"),

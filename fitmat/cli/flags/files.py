@@ -81,7 +81,12 @@ CompleteFlag = Annotated[
 ]
 
 FillingFlag = Annotated[
-    str, typer.Option(help="Model that fills the gaps; see [bold]fitmat models[/bold].", metavar="NAME")
+    str | None,
+    typer.Option(
+        help="Model that fills the gaps, beside --complete; lambert+ggx without. See [bold]fitmat models[/bold].",
+        metavar="NAME",
+        show_default=False,
+    ),
 ]
 
 ReplaceFlag = Annotated[bool, typer.Option("--force", help="Replace what is written where it exists.")]
