@@ -19,7 +19,6 @@ from fitmat import arguments
 from fitmat._types import Progress
 from fitmat.errors import OutputError
 from fitmat.extras import needed
-from fitmat.fitting.completing import completed
 from fitmat.fitting.coordinates import channel_names
 from fitmat.fitting.quantities import Quantity, dataframe, named
 from fitmat.fitting.result import Fit, by_curvature, quantities
@@ -250,6 +249,8 @@ class Posterior:
         Raises:
             ModelError: there is no finite fit, or no likelihood.
         """
+        from fitmat.fitting.completing import completed  # loads scipy's optimisers
+
         for name, w in (("wi", wi), ("wo", wo)):
             found = arguments.numbers(name, w)
             if found.ndim != 2 or found.shape[1] != 3 or not (found[:, 2] > 0).all():
