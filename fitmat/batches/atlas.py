@@ -17,6 +17,7 @@ from fitmat import arguments
 from fitmat.errors import ReadError
 from fitmat.extras import needed
 from fitmat.maths.directions import directions
+from fitmat.measurements.parsing.angles import DOUBTFUL
 from fitmat.measurements.samples import default_channels
 from fitmat.text import brief, visible
 
@@ -28,9 +29,6 @@ SUFFIXES = (".npz", ZARR)
 
 ANGLES = ("theta_i", "theta_o", "phi_i", "phi_o")
 """Arrays of angles in degrees, in place of wi and wo."""
-
-RADIANS = 0.1, 1.6
-"""Largest zenith angle between which angles that should be degrees look like radians."""
 
 KNOWN = ("value", "sigma", "wi", "wo", *ANGLES, "channels")
 """Arrays that an atlas may hold."""
@@ -194,7 +192,7 @@ def _directions(path: Path, found: Mapping[str, np.ndarray]) -> tuple[np.ndarray
         got = ", ".join([*vectors, *angles]) or "none"
         raise ReadError(f"{path}: directions {got}, expected wi and wo, or theta_i and theta_o (degrees).")
     most = max(float(np.nanmax(np.abs(found[name]), initial=0.0)) for name in ("theta_i", "theta_o"))
-    if RADIANS[0] < most <= RADIANS[1]:
+    if DOUBTFUL[0] < most <= DOUBTFUL[1]:
         got = f"no zenith angle exceeds {most:.3g}, expected degrees; they look like radians"
         raise ReadError(f"{path}: {got}. Convert them, or give wi and wo.")
     told = {"phi_i": np.zeros(()), "phi_o": np.full((), 180.0)} | {name: found[name] for name in angles}

@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
+from fitmat.maths.matern import matern
+
 RANK = 160
 """Most columns of the pivoted Cholesky factor that stands for the K of a part."""
 
@@ -140,12 +142,6 @@ def factor(places: Float[np.ndarray, "n d"], rows: Bool[np.ndarray, " n"]) -> Fl
     root = np.zeros((len(places), count))
     root[where] = columns[:count].T
     return root
-
-
-def matern(distance: np.ndarray) -> np.ndarray:
-    """(1 + √3 d) exp(−√3 d)."""
-    q = np.sqrt(3.0) * distance
-    return (1.0 + q) * np.exp(-q)
 
 
 class Sizes(NamedTuple):

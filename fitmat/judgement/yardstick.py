@@ -14,9 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.fitting.process import ASKED, FEWEST, factor, matern, sizes
+from fitmat.fitting.process import ASKED, FEWEST, factor, sizes
 from fitmat.fitting.result import Fit
 from fitmat.maths.directions import zenith
+from fitmat.maths.matern import matern
 from fitmat.measurements.samples import Measurements
 from fitmat.models.metrics import cube_root
 from fitmat.models.values import at

@@ -18,6 +18,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 from scipy.spatial import KDTree
 
+from fitmat.maths.matern import matern
 from fitmat.maths.normal import Z95
 from fitmat.text import brief
 
@@ -116,12 +117,6 @@ def _apart(a: Float[np.ndarray, "m i d"], b: Float[np.ndarray, "m j d"]) -> Floa
     return np.sqrt(square)
 
 
-def matern(distance: np.ndarray) -> np.ndarray:
-    """(1 + √3 d) exp(−√3 d)."""
-    q = np.sqrt(3.0) * distance
-    return (1.0 + q) * np.exp(-q)
-
-
 def kriging(
     places: Float[np.ndarray, "n d"],
     rest: Float[np.ndarray, "n c"],
@@ -171,7 +166,7 @@ def _blocks(places: np.ndarray, rng: np.random.Generator) -> list[np.ndarray]:
 
 def _surprise(at: np.ndarray, rest: np.ndarray, noise: np.ndarray, process: float, own: float) -> float:
     """−ln of the density of values, each kind by itself."""
-    matrix = process * matern(np.linalg.norm(at[:, None] - at[None], axis=-1))
+    matrix = process * matern(_apart(at[None], at[None])[0])
     matrix[np.diag_indices(len(at))] += noise + own + 1e-9 * process
     factor = cho_factor(matrix, lower=True, check_finite=False)
     half = float(np.sum(np.log(np.diagonal(factor[0]))))

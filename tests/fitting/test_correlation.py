@@ -14,10 +14,11 @@ from fitmat.fitting import correlation, linear
 from fitmat.fitting.left_blocks import BLOCKS, LEAST, Again, left_out, of_few, ranges
 from fitmat.fitting.likelihood import prepare
 from fitmat.fitting.losses import LOSSES
-from fitmat.fitting.process import ASKED, LEFT_OVER, counted, factor, find, independent, kernel, matern, sizes
+from fitmat.fitting.process import ASKED, LEFT_OVER, counted, factor, find, independent, kernel, sizes
 from fitmat.fitting.result import Fit
 from fitmat.judgement.scope import describe_scope
 from fitmat.maths.directions import from_angles
+from fitmat.maths.matern import matern
 from fitmat.measurements.noise import measured_noise
 
 INCIDENCES = np.deg2rad([10.0, 30.0, 50.0])

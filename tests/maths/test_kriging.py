@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from fitmat.maths.kriging import NEIGHBOURS, Kriging, kriging, matern
+from fitmat.maths.kriging import NEIGHBOURS, Kriging, kriging
+from fitmat.maths.matern import matern
 
 
 def field(places: np.ndarray, lengths: np.ndarray, rng: np.random.Generator, kinds: int = 3) -> np.ndarray:

@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from fitmat.fitting.correlation import places
-from fitmat.fitting.process import matern
 from fitmat.fitting.result import Fit
 from fitmat.judgement.design.candidates import Candidates
+from fitmat.maths.matern import matern
 
 MOST = 1024
 """Of more readings of a file an evenly spread part stands for all."""

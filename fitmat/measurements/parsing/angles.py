@@ -16,9 +16,11 @@ from fitmat.measurements.parsing.table import Table
 ROUNDING = 1e-6
 """Radians; printed angles are rounded, so one this close to 90° or 180° is there."""
 
+DOUBTFUL = (0.1, 1.6)
+"""Largest zenith angle between which what should be degrees looks like radians."""
+
 _LIMIT = {"theta_i": 180, "theta_o": 180, "phi": 360, "phi_i": 360, "phi_o": 360, "elevation_i": 90, "elevation_o": 90}
 _STATED = {"deg": "degrees", "rad": "radians", "gon": "gon"}
-_DOUBTFUL = (0.1, 1.6)
 _SCAN = (0.7, 0.5)
 # Beside angles in degrees, one that reaches less far, or varies less, is a fixed setting near the normal.
 _DOUBTFUL_AZIMUTH = (1.5, 6.2842)
@@ -163,8 +165,8 @@ def _refuse_doubtful_zeniths(table: Table, angles: Mapping[str, np.ndarray], opt
     unsaid = [name for name in zeniths if options.unit(name) is None]
     most = max(largest.values())
     for name in unsaid:
-        alone = _SCAN[0] < largest[name] <= _DOUBTFUL[1] < most and _varies(zeniths[name])
-        if not alone and (len(unsaid) < len(zeniths) or not _DOUBTFUL[0] < most <= _DOUBTFUL[1]):
+        alone = _SCAN[0] < largest[name] <= DOUBTFUL[1] < most and _varies(zeniths[name])
+        if not alone and (len(unsaid) < len(zeniths) or not DOUBTFUL[0] < most <= DOUBTFUL[1]):
             continue
         got = f"no {name} exceeds" if alone else "no zenith angle exceeds"
         column = f"{name}=" if alone else ""
