@@ -10,13 +10,16 @@ from typing import Any, NoReturn
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.errors import FitmatError
+from fitmat.errors import FitmatError, ModelError
 
 ZENITH, AZIMUTH = (np.pi / 2, "π/2"), (2 * np.pi, "2π")
 """Largest zenith angle and largest azimuth, radians, and how they are written."""
 
 ROUNDING = 1e-6
 """Radians by which a rounded angle may lie beyond its limit."""
+
+UNIT = 1e-6
+"""How far the length of a direction may be from 1."""
 
 _WHENCE = {
     "Measurements": "Measurements, from fitmat.read or fitmat.from_arrays",
@@ -158,6 +161,17 @@ def angles(
 
 def _within(found: np.ndarray, largest: float, signed: bool) -> np.ndarray:
     return (np.abs(found) <= largest + ROUNDING) & (signed | (found >= 0))
+
+
+def unit_vectors(name: str, given: Float[np.ndarray, "n 3"]) -> None:
+    """Stop where a row of an argument is not of unit length.
+
+    Raises:
+        ModelError: names the argument, the first such row and its length.
+    """
+    length = np.linalg.norm(given, axis=1)
+    for row in np.flatnonzero(~(np.abs(length - 1.0) <= UNIT))[:1]:
+        raise ModelError(f"{name} row {row} has length {length[row]:.9g}: expected unit vectors.")
 
 
 def refuse(name: str, given: object, wanted: str) -> NoReturn:

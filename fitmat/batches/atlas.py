@@ -183,8 +183,9 @@ def _directions(path: Path, found: Mapping[str, np.ndarray]) -> tuple[np.ndarray
     if len(vectors) == 2 and not angles:
         wi, wo = (arguments.numbers(f"{name} of {path}", found[name]) for name in vectors)
         for name, w in (("wi", wi), ("wo", wo)):
-            if w.ndim != 2 or w.shape[1] != 3 or not np.allclose(np.linalg.norm(w, axis=1), 1.0, atol=1e-6):
+            if w.ndim != 2 or w.shape[1] != 3:
                 raise ReadError(f"{path}: {name} of shape {w.shape}, expected (n, 3) unit vectors.")
+            arguments.unit_vectors(f"{name} of {path}", w)
         if len(wi) != len(wo):
             raise ReadError(f"{path}: {len(wi)} rows of wi and {len(wo)} of wo, expected as many.")
         return wi, wo

@@ -13,13 +13,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
 
+from fitmat import arguments
 from fitmat.errors import ModelError
 from fitmat.maths.directions import from_angles, zenith
 from fitmat.maths.warp import EDGE, Blend, Cell, Warp
 from fitmat.text import brief
-
-UNIT = 1e-6
-"""How far the length of a direction may be from 1."""
 
 _BLOCK = 2**17
 """Numbers at a time while the nodes of a file are worked out."""
@@ -191,9 +189,6 @@ def _checked(wi: ArrayLike, wo: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     pair = np.asarray(wi, float), np.asarray(wo, float)
     if pair[0].shape != pair[1].shape or pair[0].ndim != 2 or pair[0].shape[1] != 3:
         raise ModelError(f"wi and wo have shapes {pair[0].shape} and {pair[1].shape}: expected the same (n, 3).")
-    for label, w in zip(("wi", "wo"), pair, strict=True):
-        length = np.linalg.norm(w, axis=1)
-        if not (np.abs(length - 1.0) <= UNIT).all():
-            row = int(np.argmin(np.abs(length - 1.0) <= UNIT))
-            raise ModelError(f"{label} row {row} has length {length[row]:.6g}: expected unit vectors.")
+    for name, w in zip(("wi", "wo"), pair, strict=True):
+        arguments.unit_vectors(name, w)
     return pair

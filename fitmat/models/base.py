@@ -223,16 +223,18 @@ def padded_length(count: int) -> int:
 
 
 def direction_pairs(wi: ArrayLike, wo: ArrayLike) -> list[Float[np.ndarray, "n 3"]]:
-    """Both as arrays of numbers, (n, 3); a single direction beside n stands for as many.
+    """Both as unit vectors, (n, 3); a single direction beside n stands for as many.
 
     Raises:
-        FitmatError: they are no numbers, or not of shape (n, 3).
+        FitmatError: they are no numbers, not of shape (n, 3), or not of unit length.
     """
     pair = [arguments.numbers(name, w) for name, w in (("wi", wi), ("wo", wo))]
     listed = all(w.ndim == 2 and w.shape[1] == 3 and len(w) > 0 for w in pair)
     if not listed or len({1, *map(len, pair)}) > 2:
         got = f"wi and wo have shapes {pair[0].shape} and {pair[1].shape}"
         raise ModelError(f"{got}: expected (n, 3), n ≥ 1, of both, or (1, 3) of one.")
+    for name, w in zip(("wi", "wo"), pair, strict=True):
+        arguments.unit_vectors(name, w)
     return list(np.broadcast_arrays(*pair))
 
 
@@ -269,11 +271,6 @@ def evaluate(
     """
     arguments.kind("model", model, AbstractBRDF)
     pair = direction_pairs(wi, wo)
-    for label, w in zip(("wi", "wo"), pair, strict=True):
-        length = np.linalg.norm(w, axis=1)
-        if not np.allclose(length, 1.0, atol=1e-6):
-            row = int(np.argmax(np.abs(length - 1.0)))
-            raise ModelError(f"{label} row {row} has length {length[row]:.6g}: expected unit vectors.")
     if isinstance(model, AbstractEstimated):
         arguments.whole("samples", samples, 2)
         arguments.whole("seed", seed)

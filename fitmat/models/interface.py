@@ -125,11 +125,6 @@ def evaluate_interface(
     """
     eta = _checked(surface, masking)
     pair = direction_pairs(wi, wo)
-    for label, w in zip(("wi", "wo"), pair, strict=True):
-        length = np.linalg.norm(w, axis=1)
-        if not (np.abs(length - 1.0) < 1e-6).all():
-            row = int(np.argmax(~(np.abs(length - 1.0) < 1e-6)))
-            raise ModelError(f"{label} row {row} has length {length[row]:.6g}: expected unit vectors.")
     turned = pair[0][:, 2] < 0.0
     flip = np.where(turned[:, None], [1.0, 1.0, -1.0], 1.0)
     light, sensor = (jnp.asarray((w * flip).T) for w in pair)

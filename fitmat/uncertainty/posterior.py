@@ -17,7 +17,7 @@ from jaxtyping import Float
 
 from fitmat import arguments
 from fitmat._types import Progress
-from fitmat.errors import OutputError
+from fitmat.errors import ModelError, OutputError
 from fitmat.extras import needed
 from fitmat.fitting.coordinates import channel_names
 from fitmat.fitting.quantities import Quantity, dataframe, named
@@ -247,7 +247,7 @@ class Posterior:
             deviation.
 
         Raises:
-            ModelError: there is no finite fit, or no likelihood.
+            FitmatError: directions are no unit vectors above the surface, or not as many; no finite fit, or no likelihood.
         """
         from fitmat.fitting.completing import completed  # loads scipy's optimisers
 
@@ -255,6 +255,9 @@ class Posterior:
             found = arguments.numbers(name, w)
             if found.ndim != 2 or found.shape[1] != 3 or not (found[:, 2] > 0).all():
                 arguments.refuse(name, w, "unit vectors above the surface, (m, 3)")
+            arguments.unit_vectors(name, found)
+        if len(wi) != len(wo):
+            raise ModelError(f"{len(wi)} rows of wi and {len(wo)} of wo, expected as many.")
         arguments.function("progress", progress)
         pair = np.asarray(wi, float), np.asarray(wo, float)
         return completed(self.fit, self.values, *pair, measurements, progress)

@@ -235,7 +235,11 @@ UP = np.tile([0.0, 0.0, 1.0], (SAMPLES, 1))
         ({"theta_i": np.array(120.0)}, "120"),
         (
             {"theta_i": None, "theta_o": None, "wi": 2 * UP, "wo": UP},
-            r"wi of shape \(24, 3\), expected .* unit vectors",
+            r"wi of .*atlas\.npz row 0 has length 2: expected unit vectors",
+        ),
+        (
+            {"theta_i": None, "theta_o": None, "wi": UP[:, :2], "wo": UP},
+            r"wi of shape \(24, 2\), expected \(n, 3\) unit vectors",
         ),
         ({"channels": np.array(["r", "g"])}, "channels r, g for 1 columns of values"),
     ],

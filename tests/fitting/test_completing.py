@@ -104,6 +104,10 @@ def test_what_cannot_be_inferred_is_said(holes: Any) -> None:
     m, _, held, posterior = holes
     with pytest.raises(FitmatError, match=r"wi is an array of shape \(3, 2\), expected unit vectors above the surface"):
         posterior.complete(np.zeros((3, 2)), m.wo[:3])
+    with pytest.raises(FitmatError, match=r"wo row 1 has length 2: expected unit vectors"):
+        posterior.complete(m.wi[:2], m.wo[:2] * [[1.0], [2.0]])
+    with pytest.raises(FitmatError, match=r"2 rows of wi and 3 of wo, expected as many"):
+        posterior.complete(m.wi[:2], m.wo[:3])
     aim = fm.laplace(fm.fit(m.rows(np.flatnonzero(~held)), "lambert", loss="log10"), seed=0)
     with pytest.raises(FitmatError, match=r"nothing can be inferred, for the loss log10 gives no interval; exp"):
         aim.complete(m.wi[:1], m.wo[:1])

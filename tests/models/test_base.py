@@ -238,6 +238,7 @@ def test_model_refuses(name: str, options: dict[str, Any], message: str) -> None
         ),
         ([0.0, 0.0, 1.0], [0.0, 0.0, 1.0], r"shapes \(3,\) and \(3,\): expected \(n, 3\), n ≥ 1, of both"),
         ([[0, 0, 1], [0, 0, 2.0]], [[0, 0, 1], [0, 0, 1]], r"wi row 1 has length 2: expected unit vectors"),
+        ([[0, 0, 1 + 2e-6]], [[0, 0, 1.0]], r"wi row 0 has length 1\.000002: expected unit vectors"),
         ([[0, 0, 1.0]], [[0, np.nan, 1]], r"wo row 0 has length nan: expected unit vectors"),
     ],
 )

@@ -92,7 +92,7 @@ def fit_many(
         arguments.whole(name, given, 1)
     arguments.whole("threads", threads, 1, optional=True)
     arguments.function("progress", progress)
-    names, pair = asked(pool), _directions(wi, wo)
+    names, pair = asked(pool), direction_pairs(wi, wo)
     numbers = _values(value, len(pair[0]))
     noise = None if sigma is None else _noise(sigma, numbers, np.shape(value))
     shared, held = shared_by_all(pair, numbers.shape[-1], to, fixed or {}, find_loss(loss), masking)
@@ -146,16 +146,6 @@ def _pooled(names: Sequence[str], fits: Fits) -> Iterator[tuple[str, Pooled]]:
                 else:
                     ends = value - reach, value + reach
                 yield label, pooled(label, entry.param, *ends)
-
-
-def _directions(wi: ArrayLike, wo: ArrayLike) -> list[Float[np.ndarray, "n 3"]]:
-    pair = direction_pairs(wi, wo)
-    for name, w in zip(("wi", "wo"), pair, strict=True):
-        length = np.linalg.norm(w, axis=1)
-        if not np.allclose(length, 1.0, atol=1e-6):
-            row = int(np.argmax(np.abs(np.nan_to_num(length) - 1.0)))
-            raise ModelError(f"{name} row {row} has length {length[row]:.6g}: expected unit vectors.")
-    return pair
 
 
 def _values(given: ArrayLike, rows: int) -> Float[np.ndarray, "... n c"]:

@@ -80,9 +80,7 @@ def plan_paths(wi: ArrayLike, wo: ArrayLike, *, samples: int, order: int | None)
     """Check the inputs of an estimator and share its paths among lanes; see `evaluate_walk`."""
     pair = direction_pairs(wi, wo)
     for label, w in zip(("wi", "wo"), pair, strict=True):
-        wrong = ~((np.abs(np.linalg.norm(w, axis=1) - 1.0) < 1e-6) & (w[:, 2] > 0.0))
-        if wrong.any():
-            row = int(np.argmax(wrong))
+        for row in np.flatnonzero(~(w[:, 2] > 0.0))[:1]:
             raise ModelError(f"{label} row {row} is {w[row]}: expected a unit vector above the surface, z > 0.")
     if order is not None and not 1 <= order <= MOST_BOUNCES:
         raise ModelError(f"order = {order}: expected 1 to {MOST_BOUNCES}, or None for all orders.")
