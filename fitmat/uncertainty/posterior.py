@@ -247,7 +247,7 @@ class Posterior:
             deviation.
 
         Raises:
-            FitmatError: directions are no unit vectors above the surface, or not as many; no finite fit, or no likelihood.
+            FitmatError: not as many unit vectors above the surface of both, no finite fit, or no likelihood.
         """
         from fitmat.fitting.completing import completed  # loads scipy's optimisers
 
