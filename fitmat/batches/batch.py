@@ -15,8 +15,9 @@ import polars as pl
 
 from fitmat import arguments, files
 from fitmat._types import Progress
-from fitmat.batches import cluster, pools, rows, workers
+from fitmat.batches import cluster, pools, record, rows, workers
 from fitmat.batches.jobs import Job, digest, every_file, from_table
+from fitmat.batches.record import PARTS, Claim
 from fitmat.errors import FitmatError, OutputError
 from fitmat.fitting.pooling import Pooled, asked
 from fitmat.reports import summary
@@ -24,8 +25,8 @@ from fitmat.studies import DEFAULT_MODELS
 from fitmat.studies.plan import named, wants_all
 from fitmat.text import brief, visible
 
-TABLE, PAGE, PARTS = "results.parquet", "index.html", "parts"
-"""What a batch leaves in its folder: the table, its page, and the rows of each file by key."""
+TABLE, PAGE = "results.parquet", "index.html"
+"""What a batch leaves in its folder: the table and its page."""
 
 Waiting = Mapping[str, tuple[Job, str]]
 """Key → job and the digest of its file."""
@@ -72,6 +73,7 @@ def batch(
     processes: int | None = None,
     scheduler: str | None = None,
     pool: str | Sequence[str] | None = None,
+    force: bool = False,
     progress: Progress | None = None,
 ) -> Batch:
     """Study every file, and write one table of all.
@@ -89,14 +91,16 @@ def batch(
         pool: Parameters in which the files are taken to be of one kind, as the index of one lacquer: each is drawn to
             the others as far as its own data leave it open. They are columns NAME_pooled of the table beside the
             others; what was fitted stays.
+        force: Replace the results in the folder though some are of files, or of arguments, that are not given now.
         progress: Called with what is done next.
 
     Returns:
         A `Batch`; a file that cannot be used is a row with its sentence.
 
     Raises:
-        FitmatError: no file is found, a table of jobs cannot be read, another batch writes there, the disk refuses,
-            the cluster cannot be used, or what is to be pooled is held, unknown, or of fewer than three files.
+        FitmatError: no file is found, a table of jobs cannot be read, results would be lost and `force` is off, another
+            batch writes there, the disk refuses, the cluster cannot be used, or what is to be pooled is held, unknown,
+            or of fewer than three files.
 
     Example:
         >>> batch("scans/*.csv", "results").table  # doctest: +SKIP
@@ -104,6 +108,7 @@ def batch(
     arguments.kind("folder", folder, str, os.PathLike)
     arguments.whole("processes", processes, 1, optional=True)
     arguments.kind("scheduler", scheduler, str, optional=True)
+    arguments.flags(force=force)
     arguments.function("progress", progress)
     arguments.named(reading=reading, studying=studying)
     if not wants_all(models):
@@ -115,7 +120,16 @@ def batch(
     if scheduler is not None and processes is not None:
         arguments.refuse("processes", processes, "None with a scheduler, whose workers are as many as they are")
     with files.alone(target):
-        return _studied(listed, target, _doing(processes, scheduler), names, progress or (lambda *_: None))
+        claim = record.claimed(target, _each(listed), (TABLE, PAGE), force=force)
+        return _studied(listed, claim, _doing(processes, scheduler), names, progress or (lambda *_: None))
+
+
+def _each(every: Sequence[Job]) -> dict[str, str]:
+    """Each file, and as a digest how it is read and studied; what is in it may change, and what is pooled."""
+    how: dict[str, list[Any]] = {}
+    for job in every:
+        how.setdefault(os.path.abspath(job.path), []).append([job.reading, job.studying])
+    return {path: record.digest(each) for path, each in how.items()}
 
 
 def _doing(processes: int | None, scheduler: str | None) -> Do:
@@ -138,8 +152,9 @@ def _jobs(sources: Any, table: Any, reading: dict[str, Any], told: dict[str, Any
     return every
 
 
-def _studied(every: Sequence[Job], target: Path, do: Do, names: Sequence[str], say: Progress) -> Batch:
+def _studied(every: Sequence[Job], claim: Claim, do: Do, names: Sequence[str], say: Progress) -> Batch:
     """The table of all jobs; rows are kept as they come."""
+    target = claim.folder
     done: dict[int, list[dict[str, Any]]] = {}
     keys: dict[str, list[int]] = {}
     waiting: dict[str, tuple[Job, str]] = {}
@@ -168,6 +183,7 @@ def _studied(every: Sequence[Job], target: Path, do: Do, names: Sequence[str], s
     table = _table(every, whole)
     memory = io.BytesIO()
     table.write_parquet(memory)
+    claim.renew((TABLE, PAGE), [f"{key}.json" for key in keys])
     file = files.write_bytes(target / TABLE, memory.getvalue())
     files.write_text(target / PAGE, _page(every, whole, told))
     before = sum(len(keys[key]) for key in earlier)

@@ -16,6 +16,9 @@ from fitmat.models.terms.fresnel import f0_from_eta
 BASE, ROUGH, SPECULAR, SCENE = "base_color.png", "metallic_roughness.png", "specular_color.png", "texture.gltf"
 """Names of the files."""
 
+MAPS = (BASE, ROUGH, SPECULAR, SCENE)
+"""All of them."""
+
 LEVELS = 255.0
 """Of a picture's channel."""
 

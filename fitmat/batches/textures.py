@@ -17,8 +17,10 @@ import numpy as np
 
 from fitmat import arguments, files
 from fitmat._types import Progress
+from fitmat.batches import record
 from fitmat.batches.atlas import UNREADABLE, ZARR, Atlas, read_atlas, unpacked
-from fitmat.batches.maps import maps
+from fitmat.batches.maps import MAPS, maps
+from fitmat.batches.record import PARTS
 from fitmat.extras import needed
 from fitmat.fitting.losses import DEFAULT, loss
 from fitmat.fitting.many.concluding import OUTCOMES
@@ -27,8 +29,8 @@ from fitmat.fitting.many.fitting_many import fit_many, shared_by_all
 from fitmat.models.values import slices
 from fitmat.text import brief
 
-RESULT, PARTS = "texture", "parts"
-"""What a run leaves in its folder: the arrays of all points, as .npz or .zarr, and those of each tile by key."""
+RESULT = "texture"
+"""Name of the file of all points, which ends in .npz or .zarr."""
 
 TILE = 16384
 """Points that are fitted, and kept, at a time."""
@@ -66,6 +68,7 @@ def fit_texture(
     folder: str | os.PathLike[str],
     model: str = "lambert+ggx",
     *,
+    force: bool = False,
     progress: Progress | None = None,
     **told: Any,
 ) -> Texture:
@@ -75,11 +78,13 @@ def fit_texture(
         source: The atlas, as `read_atlas` takes it.
         folder: For `texture.npz` or `texture.zarr`, and what is kept to go on after an interruption.
         model: Name of the model.
+        force: Replace the results of something else in the folder.
         progress: Called with what is done, how many points are done, and how many there are.
         **told: `fixed`, `loss`, `masking`, `starts`, `max_steps` and `threads` of `fitmat.fit_many`.
 
     Raises:
-        FitmatError: the atlas cannot be read, the arguments do not fit, another run writes there, or the disk refuses.
+        FitmatError: the atlas cannot be read, the arguments do not fit, results would be lost and `force` is off,
+            another run writes there, or the disk refuses.
 
     Example:
         >>> fit_texture("atlas.npz", "out").fits["alpha"]  # doctest: +SKIP
@@ -90,29 +95,37 @@ def fit_texture(
     atlas, target, say = read_atlas(Path(source)), Path(folder), progress or (lambda *_: None)
     given = told.get("fixed") or {}, loss(told.get("loss", DEFAULT.name)), told.get("masking")
     shared, held = shared_by_all([atlas.wi, atlas.wo], len(atlas.channels), model, *given)
-    axes = atlas.points
-    count = int(np.prod(axes))
-    tiles: list[dict[str, np.ndarray]] = []
-    earlier = 0
+    axes, count = atlas.points, int(np.prod(atlas.points))
+    name = f"{RESULT}{Path(source).suffix.lower()}"
     with files.alone(target):
-        for part in slices(count, TILE):
-            value, sigma = atlas.tile(part)
-            kept = target / PARTS / f"{_key(atlas, value, sigma, model, told)}.npz"
-            tile = _read(kept, len(value))
-            if tile is None:
-                fitted = fit_many(atlas.wi, atlas.wo, value, model, sigma=sigma, **told)
-                tile = {name: getattr(fitted, name) for name in KEPT}
-                files.write_bytes(kept, _packed(tile))
-            else:
-                earlier += len(value)
-            tiles.append(tile)
+        keys = [_key(atlas, *atlas.tile(part), model, told) for part in slices(count, TILE)]
+        of = {name: record.digest([axes, atlas.channels, keys])}
+        claim = record.claimed(target, of, (name, *MAPS), force=force)
+        each = []
+        for part, key in zip(slices(count, TILE), keys, strict=True):
+            each.append(_fitted(atlas, part, target / PARTS / f"{key}.npz", model, told))
             say(f"fitting {count} points", part.stop, count)
-        whole = {name: np.concatenate([tile[name] for tile in tiles]) for name in KEPT}
-        shaped: dict[str, Any] = {name: part.reshape(*axes, *part.shape[1:]) for name, part in whole.items()}
+        whole = {field: np.concatenate([tile[field] for tile, _ in each]) for field in KEPT}
+        shaped: dict[str, Any] = {field: part.reshape(*axes, *part.shape[1:]) for field, part in whole.items()}
         fits = Fits(shared.template, atlas.channels, held, **shaped)
-        file = _written(target / f"{RESULT}{Path(source).suffix.lower()}", _arrays(fits))
-        drawn = [files.write_bytes(target / name, content) for name, content in maps(fits).items()]
-        return Texture(file, tuple(drawn), fits, earlier)
+        drawn = maps(fits)
+        claim.renew((name, *drawn), [f"{key}.npz" for key in keys])
+        file = _written(target / name, _arrays(fits))
+        pictures = tuple(files.write_bytes(target / picture, content) for picture, content in drawn.items())
+        return Texture(file, pictures, fits, sum(len(tile["outcome"]) for tile, known in each if known))
+
+
+def _fitted(
+    atlas: Atlas, part: slice, kept: Path, model: str, told: Mapping[str, Any]
+) -> tuple[dict[str, np.ndarray], bool]:
+    """The fits of a tile, which are kept, and whether an earlier run left them."""
+    value, sigma = atlas.tile(part)
+    if (tile := _read(kept, len(value))) is not None:
+        return tile, True
+    fitted = fit_many(atlas.wi, atlas.wo, value, model, sigma=sigma, **told)
+    tile = {name: getattr(fitted, name) for name in KEPT}
+    files.write_bytes(kept, _packed(tile))
+    return tile, False
 
 
 def _key(atlas: Atlas, value: np.ndarray, sigma: np.ndarray | float | None, model: str, told: Mapping[str, Any]) -> str:

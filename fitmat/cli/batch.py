@@ -47,7 +47,8 @@ def run(
         jobs: Table of what differs from file to file.
         reading: Arguments of `fitmat.read`.
         studying: Arguments of `fitmat.study`, models included.
-        doing: How many processes work side by side, or the scheduler of a cluster; the device; what to pool.
+        doing: How many processes work side by side, or the scheduler of a cluster; the device; what to pool; whether
+            to replace results of something else.
 
     Raises:
         FitmatError: as `batch`, or the device is no CPU.
@@ -94,7 +95,7 @@ def texture(
         idle: Other flags, all of no use here, which are refused.
         reading: Arguments of `fitmat.read`.
         studying: Arguments of `fitmat.study`, of which a texture takes some.
-        doing: How many threads work side by side, and on which device.
+        doing: How many threads work side by side, on which device, and whether to replace results of something else.
 
     Raises:
         FitmatError: as `fit_texture`, a flag is of no use to a texture, or there is no such device.
@@ -116,7 +117,8 @@ def texture(
     try:
         with session.watch() as watch:
             told = {name: studying[name] for name in ("loss", "masking", "fixed")}
-            found = fit_texture(source, folder, model, progress=watch, threads=doing["threads"], **told)
+            told |= {"threads": doing["threads"], "force": doing["force"]}
+            found = fit_texture(source, folder, model, progress=watch, **told)
     except KeyboardInterrupt:
         process.say(f"fitmat: interrupted; what was done is kept in {folder}: the same command goes on.", err=True)
         raise SystemExit(interrupts.INTERRUPTED) from None

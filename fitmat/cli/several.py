@@ -17,6 +17,7 @@ from fitmat.cli.flags.batch import (
     McmcFlag,
     PoolFlag,
     ProcessesFlag,
+    ReplaceBatchFlag,
     SchedulerFlag,
     SourcesFlag,
 )
@@ -92,6 +93,7 @@ def batch(
     tilt: TiltFlag = False,
     dispersion: DispersionFlag = None,
     film: FilmFlag = None,
+    force: ReplaceBatchFlag = False,
 ) -> None:
     """Fit every file of a folder or a list, or every point of a texture, and write one table of all."""
     process.set_up()
@@ -101,9 +103,12 @@ def batch(
     told |= {"dispersion": dispersion, "film": film, "sampling": mcmc} | fit.known(fix or [], prior or [])
     read = reading | {"instrument": instrument}
     if batch.is_texture(files or []):
-        idle, doing = {"jobs": jobs, "scheduler": scheduler, "pool": pool}, {"threads": processes, "device": device}
+        idle, doing = (
+            {"jobs": jobs, "scheduler": scheduler, "pool": pool},
+            {"threads": processes, "device": device, "force": force},
+        )
         return batch.texture((files or [])[0], out, idle, read, told, doing)
-    doing = {"processes": processes, "scheduler": scheduler, "device": device, "pool": pool}
+    doing = {"processes": processes, "scheduler": scheduler, "device": device, "pool": pool, "force": force}
     found = batch.run(files or [], out, jobs, read, told, doing)
     batch.show(found)
     if found.counts["refused"]:

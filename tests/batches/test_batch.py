@@ -17,7 +17,7 @@ from fitmat.batches import workers
 from fitmat.batches.jobs import Job, digest, every_file, from_table
 from fitmat.batches.rows import CARDS, SWATCH
 from fitmat.batches.workers import studied
-from fitmat.errors import FitmatError
+from fitmat.errors import FitmatError, OutputError
 from fitmat.studies import record
 from fitmat.studies.cards import cards
 
@@ -110,13 +110,34 @@ def test_what_is_done_is_not_done_again(scans: Path, tmp_path: Path, monkeypatch
     fm.batch(scans, out, "lambert")
     assert asked == ["sparse.csv"]
     asked.clear()
-    fm.batch(scans / "wax.csv", out, "lambert", studying={"fixed": {"kd": 0.5}})
+    fm.batch(scans / "wax.csv", out, "lambert", studying={"fixed": {"kd": 0.5}}, force=True)
     assert asked == ["wax.csv"]
+    fm.batch(scans, out, "lambert", force=True)
     for part in (out / "parts").iterdir():
         part.write_text("[", encoding="utf-8")
     asked.clear()
     assert len(fm.batch(scans, out, "lambert").table) == len(first.table)
     assert len(asked) == 4
+
+
+def test_another_batch_takes_no_rows_away(scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files may be added, and change; a file that is left out, or asked otherwise, would lose its rows."""
+    monkeypatch.setattr(workers, "each", lambda jobs, count: ((key, [FITTED]) for key in jobs))
+    out, one = tmp_path / "out", scans / "wax.csv"
+    fm.batch(one, out, "lambert")
+    assert len(fm.batch([one, scans / "sparse.csv"], out, "lambert").table) == 2
+    before = (out / "results.parquet").read_bytes()
+    with pytest.raises(OutputError, match=r"out holds results of other data.*\(.*sparse\.csv\), which would be lost"):
+        fm.batch(one, out, "lambert")
+    with pytest.raises(OutputError, match=r"\(.*wax\.csv and 1 more\), which would be lost"):
+        fm.batch([one, scans / "sparse.csv"], out, "ggx")
+    assert (out / "results.parquet").read_bytes() == before
+    assert len(fm.batch(one, out, "lambert", force=True).table) == 1
+    assert len(list((out / "parts").iterdir())) == 1
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "index.html").write_text("mine")
+    with pytest.raises(OutputError, match=r"index\.html is not known to be of an earlier batch"):
+        fm.batch(one, tmp_path / "own", "lambert", force=True)
 
 
 @pytest.mark.parametrize("text", [None, "", "theta_i,theta_o,brdf\n10,20,0.1\n"])
@@ -277,7 +298,7 @@ def test_two_batches_do_not_write_to_one_folder(tmp_path: Path) -> None:
     with files.alone(out), pytest.raises(FitmatError, match=r"out is being written by another run; wait for it"):
         fm.batch(DATA / "wax.csv", out, "lambert")
     assert len(fm.batch(DATA / "wax.csv", out, "lambert").table) == 1
-    assert sorted(os.listdir(out)) == ["index.html", "parts", "results.parquet"]
+    assert sorted(os.listdir(out)) == ["batch.json", "index.html", "parts", "results.parquet"]
 
 
 def deadly(job: Job, content: str) -> Any:

@@ -19,6 +19,7 @@ from typer.testing import CliRunner
 import fitmat as fm
 from fitmat.batches import textures
 from fitmat.batches.atlas import read_atlas
+from fitmat.batches.maps import MAPS
 from fitmat.batches.textures import fit_texture
 from fitmat.cli.application import app
 from fitmat.errors import FitmatError, OutputError
@@ -145,7 +146,41 @@ def test_tiles_are_kept_and_used_again(
     calls.clear()
     calls += [0, 0]
     other: dict[str, Any] = {"loss": "default"}
-    assert fit_texture(atlas, out, **other).earlier == 0
+    assert fit_texture(atlas, out, force=True, **other).earlier == 0
+
+
+def test_another_texture_takes_no_results_away(atlas: Path, tmp_path: Path) -> None:
+    """Of another format, of other flags, or of other values in the same file; with force nothing of it is left."""
+    out, group = tmp_path / "out", zarr_group(tmp_path / "atlas.zarr")
+    fit_texture(atlas, out, **TOLD)
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    with pytest.raises(OutputError, match=r"out holds results of other data or flags.*\(texture\.npz\).*--force"):
+        fit_texture(group, out, **TOLD)
+    with pytest.raises(OutputError, match="which would be lost"):
+        fit_texture(atlas, out, loss="gaussian")
+    other: dict[str, Any] = arrays() | {"value": 2.0 * arrays()["value"]}
+    np.savez(atlas, **other)
+    asked = ["batch", str(atlas), "--out", str(out), "--loss", "gaussian", "--fix", "ks=1", "--fix", "eta=1.5"]
+    assert "which would be lost" in str(CliRunner().invoke(app, asked).exception)
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+    assert fit_texture(group, out, force=True, **TOLD).earlier == ROWS * COLUMNS  # its values are the first's
+    assert {path.name for path in out.iterdir()} == {"texture.zarr", *MAPS, "parts", "batch.json"}
+    some: dict[str, Any] = other | {name: other[name].reshape(-1, SAMPLES, 1)[:2] for name in ("value", "sigma")}
+    np.savez(atlas, **some)
+    assert CliRunner().invoke(app, [*asked, "--force"]).exit_code == 0
+    assert {path.name for path in out.iterdir()} == {"texture.npz", "parts", "batch.json"}
+    assert len(list((out / "parts").iterdir())) == 1
+
+
+def test_a_texture_replaces_no_file_of_the_user(atlas: Path, tmp_path: Path) -> None:
+    """Nor does force, nor where what should be the record is none."""
+    (tmp_path / "base_color.png").write_text("mine")
+    for force in (False, True):
+        with pytest.raises(OutputError, match=r"base_color\.png is not known to be of an earlier batch"):
+            fit_texture(atlas, tmp_path, force=force, **TOLD)
+    (tmp_path / "batch.json").write_text('{"of": 5}')
+    with pytest.raises(OutputError, match=r"batch\.json is no record of a batch"):
+        fit_texture(atlas, tmp_path, **TOLD)
 
 
 def test_maps_hold_the_parameters(atlas: Path, tmp_path: Path) -> None:

@@ -63,3 +63,7 @@ DeviceFlag = Annotated[
 McmcFlag = Annotated[
     bool, typer.Option("--mcmc", help="Sample every posterior; slower, else intervals from Laplace's approximation.")
 ]
+
+ReplaceBatchFlag = Annotated[
+    bool, typer.Option("--force", help="Replace results in --out of other files, another texture or other flags.")
+]

@@ -1,0 +1,129 @@
+"""Record: what a batch's folder holds, by which the same batch that goes on is told from another.
+
+It fits nothing, and removes only what a batch wrote.
+"""
+
+import dataclasses
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from fitmat import files
+from fitmat.errors import OutputError
+from fitmat.text import visible
+
+RECORD = "batch.json"
+"""Name of the record."""
+
+PARTS = "parts"
+"""Folder in a batch's folder of what is kept to go on, by key."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Record:
+    """What a folder holds.
+
+    Attributes:
+        of: What was fitted → how, or what it was, as a digest.
+        files: Names of the results.
+        parts: Names of what they are made of, in `PARTS`.
+    """
+
+    of: Mapping[str, str]
+    files: Sequence[str]
+    parts: Sequence[str]
+
+
+@dataclasses.dataclass(frozen=True)
+class Claim:
+    """A folder in which nothing is in the way of results.
+
+    Attributes:
+        folder: Of the batch.
+        before: What it holds.
+        of: What is fitted now, as in `Record`.
+    """
+
+    folder: Path
+    before: Record
+    of: Mapping[str, str]
+
+    def renew(self, names: Sequence[str], parts: Sequence[str]) -> None:
+        """Write the record, before the results; of something else, what nothing replaces is removed.
+
+        Args:
+            names: Of the results.
+            parts: Of what they are made of.
+
+        Raises:
+            OutputError: something cannot be written or removed.
+        """
+        if _lost(self.before, self.of):
+            for name in set(self.before.files) - set(names):
+                _remove(self.folder / name)
+            for name in set(self.before.parts) - set(parts):
+                _remove(self.folder / PARTS / name)
+        after = dataclasses.asdict(Record(self.of, names, parts))
+        files.write_text(self.folder / RECORD, json.dumps(after))
+
+
+def digest(told: Any) -> str:
+    """Of anything that JSON, or its words, can say."""
+    return hashlib.sha256(json.dumps(told, sort_keys=True, default=str).encode()).hexdigest()[:32]
+
+
+def claimed(folder: Path, of: Mapping[str, str], names: Sequence[str], *, force: bool) -> Claim:
+    """The folder for results of `of`, in files of these names.
+
+    Args:
+        folder: Of the batch.
+        of: What is to be fitted → how, or what it is, as a digest.
+        names: Of every file that may be written.
+        force: Whether results of something else may be replaced.
+
+    Raises:
+        OutputError: they would be lost, or a file of such a name is of no batch.
+    """
+    before = _earlier(folder)
+    for name in names:
+        if name not in before.files and os.path.lexists(folder / name):
+            why = f"{folder / name} is not known to be of an earlier batch, and is not replaced"
+            raise OutputError(f"{why}; move it, or give another --out DIR.")
+    if (lost := _lost(before, of)) and not force:
+        more = f" and {len(lost) - 1} more" if len(lost) > 1 else ""
+        got = f"{folder} holds results of other data or flags, or of another fitmat ({visible(lost[0])}{more})"
+        raise OutputError(f"{got}, which would be lost; give another --out DIR, or --force to replace them.")
+    return Claim(folder, before, of)
+
+
+def _earlier(folder: Path) -> Record:
+    """What a batch left; an empty record where none did."""
+    try:
+        found = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        names, parts = ([name for name in found[key] if Path(name).name == name] for key in ("files", "parts"))
+        return Record(dict(found["of"]), names, parts)
+    except FileNotFoundError:
+        return Record({}, (), ())
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        why = f"{folder / RECORD} is no record of a batch, and is not replaced"
+        raise OutputError(f"{why}; move it, or give another --out DIR.") from error
+
+
+def _lost(before: Record, of: Mapping[str, str]) -> list[str]:
+    """What is in a record and would not be, or not so, in the next."""
+    return [name for name, how in before.of.items() if of.get(name) != how]
+
+
+def _remove(path: Path) -> None:
+    try:
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)
+    except OSError as error:
+        why = f"{path} is of what --force replaces, and cannot be removed ({error.strerror or error})"
+        raise OutputError(f"{why}; remove it, or give another --out DIR.") from error
