@@ -26,7 +26,7 @@ from fitmat.fitting.losses import DEFAULT, loss
 from fitmat.fitting.many.concluding import OUTCOMES
 from fitmat.fitting.many.fits import Fits
 from fitmat.fitting.many.fitting_many import fit_many, shared_by_all
-from fitmat.models.values import slices
+from fitmat.maths.parts import slices
 from fitmat.text import brief
 
 RESULT = "texture"

@@ -17,10 +17,10 @@ from fitmat.fitting.likelihood import Data, every_residual
 from fitmat.maths.grams import Layout, solve
 from fitmat.maths.least_squares import normal_equations
 from fitmat.maths.mapping import mapped
+from fitmat.maths.parts import slices
 from fitmat.maths.programs import program
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector
-from fitmat.models.values import slices
 
 AT_ONCE = 16
 """Points for which the program is compiled."""

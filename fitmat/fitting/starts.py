@@ -14,9 +14,10 @@ from jaxtyping import Float
 from fitmat.fitting.channelwise import Part, divides
 from fitmat.fitting.likelihood import Data
 from fitmat.fitting.stabilising import spread, stabilised
+from fitmat.maths.parts import slices
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import Entry, entries, holding
-from fitmat.models.values import SMALL, slices, values
+from fitmat.models.values import SMALL, values
 
 MAX_ROWS = SMALL[1]
 """The grid looks at no more rows than this, evenly spread over the file."""

@@ -15,10 +15,11 @@ from fitmat.fitting.result import Fit
 from fitmat.fitting.stabilising import from_stabilised, stabilised
 from fitmat.maths import normal
 from fitmat.maths.directions import from_angles
+from fitmat.maths.parts import slices
 from fitmat.measurements.samples import Measurements
 from fitmat.models.around.noise import Noisy
 from fitmat.models.parameters import with_vector
-from fitmat.models.values import at, slices, values
+from fitmat.models.values import at, values
 from fitmat.text import brief
 from fitmat.uncertainty.posterior import Posterior
 

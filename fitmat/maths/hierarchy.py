@@ -12,6 +12,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from fitmat.maths import normal
+from fitmat.maths.parts import slices
 
 FEWEST = 3
 """Members from which on the posterior exists: with two, any spread between them is as likely as the next."""
@@ -72,9 +73,7 @@ def population(found: ArrayLike, sd: ArrayLike) -> Population:
     tau, weight, edges = _spreads(y, variance)
     mean, of_mean, _ = _centre(y, variance, tau)
     members, deviation = np.empty((len(y), len(LEVELS))), np.empty(len(y))
-    size = max(1, AT_ONCE // len(tau))
-    for begin in range(0, len(y), size):
-        some = slice(begin, begin + size)
+    for some in slices(len(y), max(1, AT_ONCE // len(tau))):
         share = tau**2 / (variance[some, None] + tau**2)
         means = share * y[some, None] + (1.0 - share) * mean
         spread = np.sqrt(share * variance[some, None] + (1.0 - share) ** 2 * of_mean)
@@ -92,9 +91,8 @@ def _centre(
     y: np.ndarray, variance: np.ndarray, tau: Float[np.ndarray, " k"]
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Mean and variance of μ given τ, (5.20), and the log density of τ, (5.21), up to a constant."""
-    found, size = np.empty((3, len(tau))), max(1, AT_ONCE // len(y))
-    for begin in range(0, len(tau), size):
-        some = slice(begin, begin + size)
+    found = np.empty((3, len(tau)))
+    for some in slices(len(tau), max(1, AT_ONCE // len(y))):
         precision = 1.0 / (variance + tau[some, None] ** 2)
         of_mean = 1.0 / precision.sum(axis=1)
         mean = of_mean * (precision @ y)

@@ -20,6 +20,7 @@ from scipy.spatial import KDTree
 
 from fitmat.maths.matern import matern
 from fitmat.maths.normal import Z95
+from fitmat.maths.parts import slices
 from fitmat.text import brief
 
 NEIGHBOURS = 24
@@ -74,8 +75,7 @@ class Kriging:
     def predicted(self, places: Float[np.ndarray, "m d"], sorts: Int[np.ndarray, " m"]) -> Iterator["Part"]:
         """Some places at a time; what is expected of a place is its weights times the values of its neighbours."""
         tree, scaled = KDTree(self.places), places / self.lengths
-        for begin in range(0, len(places), AT_ONCE):
-            some = slice(begin, min(begin + AT_ONCE, len(places)))
+        for some in slices(len(places), AT_ONCE):
             _, near = tree.query(scaled[some], k=min(NEIGHBOURS, len(self.places)))
             near = near.reshape(some.stop - some.start, -1)
             weights, variance = self.told(scaled[some], near)

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from fitmat import arguments
 from fitmat.errors import ModelError
+from fitmat.maths import parts
 from fitmat.maths.directions import from_angles, zenith
 from fitmat.maths.warp import EDGE, Blend, Cell, Warp
 from fitmat.text import brief
@@ -123,10 +124,8 @@ class RGLMaterial:
         number = slices * height * width
         flags = (np.zeros(number, bool) for _ in range(2))
         nodes = Nodes(np.empty((number, 3)), np.empty((number, 3)), np.empty((number, channels)), *flags)
-        rows = max(1, _BLOCK // (channels + 16))
         azimuths = self._azimuths()
-        for start in range(0, number, rows):
-            block = slice(start, min(start + rows, number))
+        for block in parts.slices(number, max(1, _BLOCK // (channels + 16))):
             chosen, y, x = np.unravel_index(np.arange(block.start, block.stop), (slices, height, width))
             theta_i, phi_i = self.theta_i[chosen % len(self.theta_i)], azimuths[chosen // len(self.theta_i)]
             at = self.vndf.sample(np.stack([x / (width - 1), y / (height - 1)], axis=1), Blend.only(chosen))

@@ -10,10 +10,11 @@ from jaxtyping import ArrayLike, Float
 
 from fitmat import arguments
 from fitmat.errors import ModelError
+from fitmat.maths.parts import slices
 from fitmat.maths.quadrature import AZIMUTH_NODES, ZENITH_NODES, incidence_rule, lobe_rule
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector
-from fitmat.models.values import LARGE, Draws, blocks, slices, widths
+from fitmat.models.values import LARGE, Draws, blocks, widths
 from fitmat.text import brief
 
 COARSER = 5 / 8

@@ -11,6 +11,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from fitmat._types import Samples
 from fitmat.maths.mapping import mapped
+from fitmat.maths.parts import slices
 from fitmat.maths.programs import program_run_often
 from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, evaluate_pairs
@@ -110,12 +111,6 @@ def surfaces(model: AbstractBRDF, draws: Float[np.ndarray, "d p"]) -> Draws:
     """The material without what instrument and mount do, and its part of every draw; see `instrument.surface`."""
     places = vector(surface(with_vector(model, np.arange(draws.shape[1]))))
     return surface(model), draws[:, places]
-
-
-def slices(count: int, most: int) -> Iterator[slice]:
-    """Even parts of a number of things, each of at most so many."""
-    parts = -(-count // most)
-    return (slice(k * count // parts, (k + 1) * count // parts) for k in range(parts))
 
 
 def _filled(part: np.ndarray, count: int) -> np.ndarray:

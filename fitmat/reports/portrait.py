@@ -22,10 +22,10 @@ from fitmat.extras import needed
 from fitmat.files import write_bytes
 from fitmat.match.appearance import scene, spheres
 from fitmat.match.appearance.scene import Raster
+from fitmat.maths.parts import slices
 from fitmat.measurements.samples import default_channels
 from fitmat.models.base import AbstractBRDF, AbstractEstimated, Sum
 from fitmat.models.parameters import entries, vector
-from fitmat.models.values import slices
 from fitmat.text import brief
 
 Light = str | tuple[float, float]

@@ -15,10 +15,10 @@ from fitmat.fitting.coordinates import Coordinates
 from fitmat.fitting.likelihood import Data, log_density
 from fitmat.fitting.result import Fit
 from fitmat.maths.mapping import mapped
+from fitmat.maths.parts import slices
 from fitmat.maths.programs import program
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import vector
-from fitmat.models.values import slices
 from fitmat.uncertainty.scaled_weights import sampled
 
 AT_ONCE = 128

@@ -9,7 +9,7 @@ Stephens, "A new and efficient estimation method for the generalized Pareto dist
 import numpy as np
 from jaxtyping import Float
 
-from fitmat.models.values import slices
+from fitmat.maths.parts import slices
 
 FEWEST_IN_TAIL = 6
 """Weights of a tail, below which nothing is fitted to it: of five the lower quartile is the smallest."""

@@ -14,7 +14,7 @@ from fitmat.models.around.instrument import Seen
 from fitmat.models.around.noise import Noisy
 from fitmat.models.base import AbstractBRDF, evaluate
 from fitmat.models.parameters import vector, with_vector
-from fitmat.models.values import LARGE, SMALL, blocks, slices, surfaces, values, widths
+from fitmat.models.values import LARGE, SMALL, blocks, surfaces, values, widths
 
 ROUNDING = 1e-12
 """Relative; two programs of one formula."""
@@ -77,12 +77,6 @@ def test_blocks_are_the_values_of_every_set(hemisphere: Callable[[int, int], np.
         for place, (wi, wo) in enumerate(pairs):
             expected = values(model, draws, np.tile(wi, (5000, 1)), wo)
             np.testing.assert_allclose(found[k, :, place], expected, rtol=ROUNDING)
-
-
-def test_parts_are_even_and_complete() -> None:
-    assert [(s.start, s.stop) for s in slices(17, 16)] == [(0, 8), (8, 17)]
-    assert [(s.start, s.stop) for s in slices(16, 16)] == [(0, 16)]
-    assert not list(slices(0, 16))
 
 
 def test_widths_are_those_of_every_draw() -> None:
