@@ -10,9 +10,8 @@ import numpy as np
 
 from fitmat.batches.jobs import Job
 from fitmat.errors import ModelError
-from fitmat.fitting.pooling import Pooled, pooled, refuse_given
+from fitmat.fitting import pooling
 from fitmat.fitting.quantities import BOUND
-from fitmat.maths.hierarchy import FEWEST
 from fitmat.models.parameters import Param, entries
 from fitmat.models.registry import model
 from fitmat.studies.plan import named, wants_all
@@ -38,10 +37,7 @@ def refuse_idle(names: Sequence[str], jobs: Sequence[Job], told: Mapping[str, An
     """
     if not names:
         return
-    refuse_given(names, told.get("fixed") or (), told.get("priors") or ())
-    if len(jobs) < FEWEST:
-        got = f"{len(jobs)} file{'s' if len(jobs) > 1 else ''}"
-        raise ModelError(f"pool {names[0]} (--pool): {got}, expected at least {FEWEST}, of which some can differ.")
+    pooling.refuse_idle(names, len(jobs), "file", told.get("fixed") or (), told.get("priors") or ())
     asked = [job.studying["models"] for job in jobs]
     if not any(wants_all(one) for one in asked) and not (told.get("dispersion") or told.get("tilt")):
         _refuse_foreign(names, dict.fromkeys(name for one in asked for name in _known(one)))
@@ -56,19 +52,15 @@ def _known(asked: Any) -> list[str]:
 
 
 def _refuse_foreign(names: Sequence[str], models: Collection[str]) -> None:
-    having = dict.fromkeys(name for of in models for name in _parameters(of))
-    for name in names:
-        if models and name not in having:
-            raise ModelError(
-                f"pool {name} (--pool): no model of {', '.join(models)} has it, expected one of {', '.join(having)}."
-            )
+    if models:
+        pooling.refuse_foreign(names, {of: _parameters(of) for of in models})
 
 
 def _parameters(of: str) -> dict[str, Param]:
     return {entry.name: entry.param for entry in entries(model(of))}
 
 
-def pool_rows(names: Sequence[str], done: Done) -> tuple[dict[int, list[Row]], tuple[Pooled, ...]]:
+def pool_rows(names: Sequence[str], done: Done) -> tuple[dict[int, list[Row]], tuple[pooling.Pooled, ...]]:
     """The rows with the columns NAME_pooled, NAME_pooled_sd, _low and _high; and each parameter of each model, pooled.
 
     Jobs of the same rows are one file, which counts once.
@@ -85,7 +77,7 @@ def pool_rows(names: Sequence[str], done: Done) -> tuple[dict[int, list[Row]], t
         those = {key: row for key, row in every.items() if row["model"] == of}
         for label, param in _labels(names, of, those.values()):
             low, high = np.array([_ends(row, label) for row in those.values()]).T
-            found = pooled(f"{label} of {of}", param, low, high)
+            found = pooling.pooled(f"{label} of {of}", param, low, high)
             told.append(found)
             for k, key in enumerate(those):
                 if np.isfinite(found.value[k]):

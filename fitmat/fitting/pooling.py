@@ -6,7 +6,8 @@ determined stays. It fits nothing, and the other parameters of a surface stay as
 """
 
 import dataclasses
-from collections.abc import Iterable
+import itertools
+from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
 from jaxtyping import Float
@@ -131,22 +132,45 @@ def asked(pool: object) -> tuple[str, ...]:
     return names
 
 
-def refuse_given(names: Iterable[str], held: Iterable[str], told: Iterable[str] = ()) -> None:
-    """Stop where what is to be pooled is known beforehand.
+def refuse_idle(
+    names: Iterable[str], count: int, what: str, held: Collection[str], priors: Collection[str] = ()
+) -> None:
+    """Stop before anything is fitted where nothing could be pooled.
 
     Args:
         names: Of what is to be pooled.
-        held: Of parameters that are held.
-        told: Of those that have a prior.
+        count: How many surfaces there are.
+        what: Each is called, in the singular.
+        held: Parameters that are held.
+        priors: Those that have a prior.
 
     Raises:
-        ModelError: names the parameter, and what is said of it.
+        ModelError: a parameter is known beforehand, or there are too few surfaces.
     """
     for name in names:
+        begun = f"pool {name} (--pool)"
         if name in held:
-            raise ModelError(f"pool {name} (--pool): it is held, expected a parameter that is fitted. Leave one out.")
-        if name in told:
-            raise ModelError(
-                f"pool {name} (--pool): it has a prior (--prior), expected none: the others are its prior. "
-                "Leave one out."
-            )
+            raise ModelError(f"{begun}: it is held, expected a parameter that is fitted. Leave one out.")
+        if name in priors:
+            got = "it has a prior (--prior), expected none: the others are its prior"
+            raise ModelError(f"{begun}: {got}. Leave one out.")
+        if count < FEWEST:
+            got = f"{count} {what}{'s' if count > 1 else ''}"
+            raise ModelError(f"{begun}: {got}, expected at least {FEWEST}, of which some can differ.")
+
+
+def refuse_foreign(names: Iterable[str], parameters: Mapping[str, Iterable[str]]) -> None:
+    """Stop where no model has what is to be pooled.
+
+    Args:
+        names: Of what is to be pooled.
+        parameters: Of each model, by its name.
+
+    Raises:
+        ModelError: names the parameter, the models, and what they have.
+    """
+    having = list(dict.fromkeys(itertools.chain(*parameters.values())))
+    for name in names:
+        if name not in having:
+            got = f"no model of {', '.join(parameters)} has it"
+            raise ModelError(f"pool {name} (--pool): {got}, expected one of {', '.join(having)}.")

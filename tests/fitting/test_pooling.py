@@ -62,11 +62,16 @@ def test_fit_many_pools_what_it_is_asked_to() -> None:
     assert str(fits).split("\n")[1].startswith("kd, pooled over 4: ")
     wrongs: list[tuple[dict[str, Any], str]] = [
         ({"pool": "ks", "fixed": {"ks": 1.0}}, r"pool ks \(--pool\): it is held"),
-        ({"pool": "etta"}, r"pool etta: lambert\+ggx has no such parameter, expected one of kd, ks, alpha, eta"),
-        ({"pool": "eta", "loss": "log10"}, r"pool eta: the loss log10 is no likelihood"),
+        (
+            {"pool": "etta"},
+            r"pool etta \(--pool\): no model of lambert\+ggx has it, expected one of kd, ks, alpha, eta",
+        ),
+        ({"pool": "eta", "loss": "log10"}, r"pool eta \(--pool\): the loss log10 is no likelihood"),
     ]
     for wrong, message in wrongs:
         with pytest.raises(FitmatError, match=message):
             fm.fit_many(WI, WO, value, **(told | wrong))
-    with pytest.raises(FitmatError, match=r"pool eta: 2 surfaces, expected at least 3"):
+    with pytest.raises(
+        FitmatError, match=r"pool eta \(--pool\): 2 surfaces, expected at least 3, of which some can differ"
+    ):
         fm.fit_many(WI, WO, value[0], pool="eta", loss="gaussian", sigma=0.01)

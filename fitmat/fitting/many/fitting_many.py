@@ -14,6 +14,7 @@ from jaxtyping import ArrayLike, Float
 from fitmat import arguments
 from fitmat._types import Progress
 from fitmat.errors import FitmatError, ModelError, ReadError
+from fitmat.fitting import pooling
 from fitmat.fitting.coordinates import channel_names, coordinates
 from fitmat.fitting.fitting import asked_model, held_values, refuse_single_precision
 from fitmat.fitting.losses import DEFAULT, Loss
@@ -23,9 +24,7 @@ from fitmat.fitting.many.gathering import padded
 from fitmat.fitting.many.lanes import Shared
 from fitmat.fitting.many.table import table
 from fitmat.fitting.many.tiles import Work, each
-from fitmat.fitting.pooling import Pooled, asked, pooled, refuse_given
 from fitmat.fitting.refining import MAX_STEPS
-from fitmat.maths.hierarchy import FEWEST
 from fitmat.maths.normal import Z95
 from fitmat.measurements.samples import default_channels
 from fitmat.models import names
@@ -92,7 +91,7 @@ def fit_many(
         arguments.whole(name, given, 1)
     arguments.whole("threads", threads, 1, optional=True)
     arguments.function("progress", progress)
-    names, pair = asked(pool), direction_pairs(wi, wo)
+    names, pair = pooling.asked(pool), direction_pairs(wi, wo)
     numbers = _values(value, len(pair[0]))
     noise = None if sigma is None else _noise(sigma, numbers, np.shape(value))
     shared, held = shared_by_all(pair, numbers.shape[-1], to, fixed or {}, find_loss(loss), masking)
@@ -100,7 +99,7 @@ def fit_many(
         raise FitmatError(
             f"sigma is None, expected the noise: the loss {shared.loss.name} needs it. Give it, or another."
         )
-    _refuse_idle(names, shared.template, held, int(np.prod(numbers.shape[:-2])), find_loss(loss))
+    _refuse_idle(names, shared, held, int(np.prod(numbers.shape[:-2])))
     axes, flat = numbers.shape[:-2], numbers.reshape(-1, *numbers.shape[-2:])
     noise = None if noise is None else noise.reshape(flat.shape)
     work, count = Work(shared, table(shared, held), starts, max_steps), threads or os.cpu_count() or 1
@@ -117,22 +116,16 @@ def fit_many(
     return dataclasses.replace(fits, pooled=dict(_pooled(names, fits))) if names else fits
 
 
-def _refuse_idle(
-    names: Sequence[str], template: AbstractBRDF, held: Mapping[str, np.ndarray], count: int, loss: Loss
-) -> None:
+def _refuse_idle(names: Sequence[str], shared: Shared, held: Mapping[str, np.ndarray], count: int) -> None:
     """Stop where nothing could be pooled."""
-    refuse_given(names, held)
-    known = [entry.name for entry in entries(template)]
-    for name in names:
-        if name not in known:
-            raise ModelError(f"pool {name}: {template.name} has no such parameter, expected one of {', '.join(known)}.")
-        if count < FEWEST:
-            raise ModelError(f"pool {name}: {count} surface{'s' if count > 1 else ''}, expected at least {FEWEST}.")
-        if not loss.posterior:
-            raise ModelError(f"pool {name}: the loss {loss.name} is no likelihood, expected one that gives intervals.")
+    pooling.refuse_idle(names, count, "surface", held)
+    pooling.refuse_foreign(names, {shared.template.name: [entry.name for entry in entries(shared.template)]})
+    if names and not shared.loss.posterior:
+        got = f"the loss {shared.loss.name} is no likelihood"
+        raise ModelError(f"pool {names[0]} (--pool): {got}, expected one that gives intervals.")
 
 
-def _pooled(names: Sequence[str], fits: Fits) -> Iterator[tuple[str, Pooled]]:
+def _pooled(names: Sequence[str], fits: Fits) -> Iterator[tuple[str, pooling.Pooled]]:
     """Each parameter, and each channel of it, from values ± 1.96 sd of its natural coordinate."""
     ended = np.isin(fits.result, ("converged", "at_bound", "unidentifiable"))
     for entry in fits.entries:
@@ -145,7 +138,7 @@ def _pooled(names: Sequence[str], fits: Fits) -> Iterator[tuple[str, Pooled]]:
                     ends = value * np.exp(-reach / value), value * np.exp(reach / value)
                 else:
                     ends = value - reach, value + reach
-                yield label, pooled(label, entry.param, *ends)
+                yield label, pooling.pooled(label, entry.param, *ends)
 
 
 def _values(given: ArrayLike, rows: int) -> Float[np.ndarray, "... n c"]:
