@@ -74,7 +74,7 @@ class Walks(NamedTuple):
         reach: How far away its bound is, (m,).
         first: Length of the step before the first, (m,).
         least: Σ residual² from which Δ counts, (m,).
-        tangent: dt/dt_held there, (m, p).
+        gram: JᵀJ there, (m, p, p), along whose ridge the first step goes.
     """
 
     start: Float[np.ndarray, "m p"]
@@ -83,13 +83,13 @@ class Walks(NamedTuple):
     reach: Float[np.ndarray, " m"]
     first: Float[np.ndarray, " m"]
     least: Float[np.ndarray, " m"]
-    tangent: Float[np.ndarray, "m p"]
+    gram: Float[np.ndarray, "m p p"]
 
     @classmethod
     def standing(cls, points: Float[np.ndarray, "m p"], held: Int[np.ndarray, " m"]) -> "Walks":
         """Points that stay."""
-        none = np.zeros(len(points))
-        return cls(points, held, none, none, none + 1.0, none, np.zeros_like(points))
+        none, count = np.zeros(len(points)), points.shape[1]
+        return cls(points, held, none, none, none + 1.0, none, np.zeros((len(points), count, count)))
 
 
 class Reached(NamedTuple):
@@ -144,7 +144,7 @@ def settle_of(template: AbstractBRDF, data: Data, s: float, frame: Frame) -> Set
 def _packed(walks: Walks, part: slice) -> Float[np.ndarray, "m q"]:
     """Some of the walks as rows of one array, the last repeated up to `AT_ONCE`: each array of a call takes time."""
     rows = np.minimum(np.arange(part.start, part.start + AT_ONCE), part.stop - 1)
-    return np.column_stack([one[rows] for one in walks])
+    return np.column_stack([one[rows].reshape(AT_ONCE, -1) for one in walks])
 
 
 class _Place(NamedTuple):
@@ -167,7 +167,6 @@ class _Stand(NamedTuple):
     offset: Array
     last: Array
     root: Array
-    tangent: Array
     points: Array
     squares: Array
     slope: Array
@@ -221,25 +220,25 @@ def _settled(
         return jax.lax.while_loop(lambda here: here.moving & (here.looks <= most), look, begin)
 
     def one(walk: Array) -> tuple[Array, ...]:
-        t0, (place, sign, reach, first, least), tangent = jnp.split(walk, [every.count, every.count + 5])
-        k = place.astype(int)
+        t0, (place, sign, reach, first, least), square = jnp.split(walk, [every.count, every.count + 5])
+        k, gram0 = place.astype(int), square.reshape(every.count, every.count)
 
         def step(j: Array, at: _Stand) -> _Stand:
-            longest = LONGEST / jnp.max(jnp.abs(at.tangent) / span)
+            tangent = _tangent(at.gram, k, free, span)
+            longest = LONGEST / jnp.max(jnp.abs(tangent) / span)
             growing, target = at.root > 0, FARTHEST * (j + 1) / STEPS
             wanted = jnp.where(growing, at.offset * (target / jnp.where(growing, at.root, 1.0) - 1.0), GROWTH * at.last)
             last = jnp.minimum(jnp.clip(wanted, at.last / GROWTH, at.last * GROWTH), longest)
             ahead = jnp.minimum(at.offset + last, reach)
-            t = jnp.clip(at.t + at.tangent * sign * (ahead - at.offset), low, high)
+            t = jnp.clip(at.t + tangent * sign * (ahead - at.offset), low, high)
             end = settled(t.at[k].set(t0[k] + sign * ahead), k)
             root = jnp.sqrt(jnp.maximum(end.square - least, 0.0))
             points, squares = at.points.at[j].set(end.t), at.squares.at[j].set(end.square)
-            along = _tangent(end.gram, k, free, span)
-            return _Stand(end.t, ahead, last, root, along, points, squares, end.slope, end.gram)
+            return _Stand(end.t, ahead, last, root, points, squares, end.slope, end.gram)
 
-        zero, none = jnp.zeros(len(t0)), jnp.zeros(())
+        none = jnp.zeros(())
         kept = jnp.zeros((STEPS, len(t0))), jnp.zeros(STEPS)
-        begin = _Stand(t0, none, first, none, tangent, *kept, zero, jnp.outer(zero, zero))
+        begin = _Stand(t0, none, first, none, *kept, jnp.zeros(len(t0)), gram0)
         end = jax.lax.fori_loop(0, steps, step, begin)
         return end.points, end.squares, end.slope, end.gram
 
@@ -263,5 +262,7 @@ def _step(slope: Array, gram: Array, free: Array, damping: Array, span: Array) -
 def _tangent(gram: Array, held: Array, free: Array, span: Array) -> Array:
     """dt/dt_held along the ridge: the others follow so that the residuals change least."""
     released = jnp.where(free[:, None] & free, gram, 0.0) + jnp.diag(jnp.where(free, 12.0 / span**2, 1.0))
-    column = solve(released, (jnp.arange(len(span)) == held).astype(float))
-    return jnp.where(jnp.isfinite(column).all(), column / column[held], jnp.arange(len(span)) == held)
+    alone = (jnp.arange(len(span)) == held).astype(float)
+    column = solve(released, alone)
+    along = column / column[held]
+    return jnp.where(jnp.isfinite(along).all(), along, alone)

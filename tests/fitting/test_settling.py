@@ -90,13 +90,12 @@ def test_walks_leave_evenly_and_end_at_bounds(data: Data) -> None:
     best = settle(Walks.standing(frame.centre[None], np.array([-1])), 1, MOST_ITERATIONS)  # none is held
     start, least = best.points[0, 0], best.squares[0, 0]
     sd = np.sqrt(np.diagonal(np.linalg.inv(best.gram[0])))
-    tangent = np.linalg.inv(best.gram[0])[0]
     up = Walks(
         *(np.tile(part, (2, 1)) if np.ndim(part) else np.full(2, part) for part in (start, 0, 1.0)),
         reach=np.array([np.inf, 1.5 * sd[0]]),
         first=np.full(2, sd[0] / 4.0 / settling.GROWTH),
         least=np.full(2, least),
-        tangent=np.tile(tangent / tangent[0], (2, 1)),
+        gram=np.tile(best.gram, (2, 1, 1)),
     )
     found = settle(up._replace(held=up.held.astype(int)), STEPS, MOST_ITERATIONS)
     root = np.sqrt(found.squares - least)

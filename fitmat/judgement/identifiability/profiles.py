@@ -140,7 +140,7 @@ class _Surface:
         frame = Frame(self._centre, low, high, span, back, free)
         self._settle = settle_of(fit.model, part, fit.discrepancy, frame)
         here = self._settle(Walks.standing(self._centre[None], self._free[:1]), 1, 0)
-        self._least, self._gram = here.squares[0, 0], here.gram[0][self._inside]
+        self._least, self._gram = here.squares[0, 0], here.gram[0]
 
     def _every(self, chosen: Float[np.ndarray, "... f"], other: float | np.ndarray) -> Float[np.ndarray, "... p"]:
         """Of all parameters, those that are fixed with another value."""
@@ -151,14 +151,11 @@ class _Surface:
 
     def walked(self, held: np.ndarray, sign: np.ndarray) -> Points:
         """Walks from the best fit, along one parameter each, (m, `STEPS`)."""
-        unit = np.sqrt(np.diagonal(inverse_information(self._gram, self._span)))
+        unit = np.sqrt(np.diagonal(inverse_information(self._gram[self._inside], self._span)))
         first = np.minimum(unit, self._span)[held] * FARTHEST / STEPS
-        released = np.linalg.inv(self._gram + np.diag(12.0 / self._span**2))[held]
-        tangent = released / np.take_along_axis(released, held[:, None], axis=1)
         reach = np.where(sign > 0, (self.high - self.best)[held], (self.best - self.low)[held])
-        start = np.tile(self._centre, (len(held), 1))
-        least = np.full(len(held), self._least)
-        walks = Walks(start, self._free[held], sign, reach, first, least, self._every(tangent, 0.0))
+        start, least, gram = (np.stack([one] * len(held)) for one in (self._centre, self._least, self._gram))
+        walks = Walks(start, self._free[held], sign, reach, first, least, gram)
         return self._points(self._settle(walks, STEPS, MOST_ITERATIONS), held)
 
     def settled(self, t: Float[np.ndarray, "m f"], held: np.ndarray) -> tuple[Points, Float[np.ndarray, "m f f"]]:
