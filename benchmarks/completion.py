@@ -97,7 +97,7 @@ def judged(m: Measurements, held: Held) -> dict[str, float]:
     known, out = m.rows(np.flatnonzero(~held)), m.rows(rows)
     fit = fm.fit(known, MODEL)
     whole = fm.laplace(fit, seed=0).complete(out.wi, out.wo)
-    of = np.asarray(whole.inferred)
+    of = np.asarray(whole.inferred).all(axis=1)
     value, sd = whole.value[of], np.asarray(whole.sigma)[of]
     sigma = out.sigma if out.sigma is not None else np.zeros_like(value)
     inside = np.abs(value - out.value) <= 2.0 * np.hypot(sd, sigma)

@@ -118,7 +118,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
         {
             **dict.fromkeys(("wi", "wo", "value", "valid"), (None, "x", 5, [], np.zeros(3), np.zeros((2, 1)), FIT)),
             **dict.fromkeys(("sigma", "horizontal"), ("x", 5, [], np.zeros(3), np.zeros((2, 1)), FIT)),
-            "inferred": ("x", 5, [], True, np.zeros((3, 1)), np.zeros(2), FIT),
+            "inferred": ("x", 5, [], True, np.zeros(3, bool), np.zeros((2, 1)), FIT),
             "channels": (None, "r", 5, ("r", "g"), FIT),
             "instrument": NOUN,
             "stated": (None, "TIS", 0.3, [], (0.3,), FIT),

@@ -90,11 +90,14 @@ def completed(measurements: Measurements, out: Path, model: str, say: Progress, 
 
 def completion(m: Measurements) -> str:
     """How much was inferred, and how well it is known, as a sentence."""
-    inferred = np.zeros(m.n_samples, bool) if m.inferred is None else m.inferred
+    inferred = np.zeros(m.value.shape, bool) if m.inferred is None else m.inferred
     sd = np.zeros((1, 1)) if m.sigma is None else m.sigma[inferred]
     value = m.value[inferred]
     relative = np.where(sd < value, sd / np.where(value > 0.0, value, 1.0), 1.0)
-    rows = f"{np.count_nonzero(~inferred)} rows as measured, {np.count_nonzero(inferred)} inferred"
+    some, every = inferred.any(axis=1), inferred.all(axis=1)
+    rows = f"{np.count_nonzero(~some)} rows as measured, {np.count_nonzero(some)} inferred"
+    if partly := np.count_nonzero(some & ~every):
+        rows += f" ({partly} of them in some channels only)"
     half, most = (f"{100.0 * share:.2g} %" for share in np.quantile(relative, [0.5, 0.9]))
     if (lost := np.mean(relative > UNKNOWN)) > 0.1:
         got = f"WARNING: {100.0 * lost:.0f} % of them are known to no better than half of their value"

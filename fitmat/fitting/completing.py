@@ -73,9 +73,9 @@ def completed(
         progress: Called now and then with rows done and expected.
 
     Returns:
-        Rows in which every channel is valid as they were, with the noise as σ; then rows in which some channel was
-        masked, now filled; then those of `wi` and `wo`. `inferred` marks the last two; their σ is the standard
-        deviation of the surface's own value.
+        Rows in which every channel is valid as they were; then rows in which some channel was masked, now filled; then
+        those of `wi` and `wo`. `inferred` marks the values that were not there; their σ is the standard deviation of
+        the surface's own value, that of the others as it was, NaN where it was unknown.
 
     Raises:
         ModelError: the fit is not finite, or its loss is an objective.
@@ -91,16 +91,17 @@ def completed(
     known = m.rows(np.flatnonzero(whole))
     value, sd = _inferred(fit, draws, known, sigma[whole], wi, wo, progress or (lambda *_: None))
     kept = m.valid[partly]
+    given = np.full(m.value.shape, np.nan) if m.sigma is None else m.sigma
     value[: len(kept)] = np.where(kept, m.value[partly], value[: len(kept)])
-    sd[: len(kept)] = np.where(kept, sigma[partly], sd[: len(kept)])
+    sd[: len(kept)] = np.where(kept, given[partly], sd[: len(kept)])
     return dataclasses.replace(
         known,
         wi=np.concatenate([known.wi, wi]),
         wo=np.concatenate([known.wo, wo]),
         value=np.concatenate([known.value, value]),
-        sigma=np.concatenate([sigma[whole], sd]),
+        sigma=np.concatenate([given[whole], sd]),
         valid=np.ones((known.n_samples + len(wi), len(m.channels)), bool),
-        inferred=np.arange(known.n_samples + len(wi)) >= known.n_samples,
+        inferred=np.concatenate([~known.valid, ~kept, np.ones((len(wi) - len(kept), len(m.channels)), bool)]),
         masked={},
         horizontal=None,
         stated=(),

@@ -69,7 +69,8 @@ class Measurements:
         warnings: Plain sentences: what may have been read otherwise than it was meant.
         stated: What the file says that its values add up to.
         horizontal: Masked values at θ_o = 90°, sr⁻¹, NaN elsewhere, (n, c); None where there are none.
-        inferred: Rows that were not measured but inferred from the others, (n,); None where there are none.
+        inferred: Values that were not measured but inferred from the others, (n, c); None where there are none. Their
+            sigma is the standard deviation of the surface's own value; that of the others is NaN where it is unknown.
     """
 
     wi: Float[np.ndarray, "n 3"]
@@ -85,7 +86,7 @@ class Measurements:
     warnings: tuple[str, ...] = ()
     stated: tuple[StatedAlbedo, ...] = ()
     horizontal: Float[np.ndarray, "n c"] | None = None
-    inferred: Bool[np.ndarray, " n"] | None = None
+    inferred: Bool[np.ndarray, "n c"] | None = None
 
     __repr__ = brief
 
@@ -96,21 +97,14 @@ class Measurements:
         for stated in self.stated:
             arguments.kind("one of stated", stated, StatedAlbedo)
         count, columns = len(self.wi) if isinstance(self.wi, np.ndarray) else 0, len(self.channels)
-        shapes: dict[str, tuple[int, ...]] = {
-            "wi": (count, 3),
-            "wo": (count, 3),
-            "value": (count, columns),
-            "valid": (count, columns),
-        }
-        beside = ("sigma", "horizontal")
-        shapes |= {} if self.inferred is None else {"inferred": (count,)}
+        shapes = {"wi": (count, 3), "wo": (count, 3), "value": (count, columns), "valid": (count, columns)}
+        beside = ("sigma", "horizontal", "inferred")
         for name, shape in (shapes | {n: shapes["value"] for n in beside if getattr(self, n) is not None}).items():
             arguments.kind(name, given := getattr(self, name), np.ndarray)
             if given.shape != shape:
                 got, columns = f"{name} of shape {given.shape}", f", {shape[1]} columns" if shape[1:] else ""
-                raise ReadError(
-                    f"{got}, expected {shape}: a row for each of wi{columns}. fitmat.from_arrays makes them."
-                )
+                expected = f"expected {shape}: a row for each of wi{columns}"
+                raise ReadError(f"{got}, {expected}. fitmat.from_arrays makes them.")
 
     @property
     def n_samples(self) -> int:
@@ -126,6 +120,11 @@ class Measurements:
     def n_valid(self) -> int:
         """Values (rows × channels) that can be fitted."""
         return int(np.count_nonzero(self.valid))
+
+    @property
+    def sigma_given(self) -> bool:
+        """Whether the noise of what was measured is known."""
+        return self.sigma is not None and (self.inferred is None or bool(np.isfinite(self.sigma[~self.inferred]).any()))
 
     @property
     def theta_i(self) -> Float[np.ndarray, " n"]:
@@ -186,11 +185,11 @@ class Measurements:
         count = "" if len(names) == len(self.channels) else f" ({len(self.channels)})"
         lines = [
             f"{self.source}: {self.n_samples} samples, channels {', '.join(map(visible, names))}{count}",
-            f"incidence {listed}; sigma {'given' if self.sigma is not None else 'not given'}",
+            f"incidence {listed}; sigma {'given' if self.sigma_given else 'not given'}",
         ]
         lines += [f"{count} masked: {reason}" for reason, count in self.masked.items()]
         if self.inferred is not None:
-            lines += [f"{np.count_nonzero(self.inferred)} inferred, not measured"]
+            lines += [f"{np.count_nonzero(self.inferred.any(axis=1))} inferred, not measured"]
         lines += [f"WARNING: {warning}" for warning in self.warnings]
         return "\n".join([*lines, *self.notes, *filter(None, [str(self.instrument)])])
 

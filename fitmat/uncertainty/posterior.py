@@ -243,8 +243,8 @@ class Posterior:
             progress: Called now and then with rows done and expected.
 
         Returns:
-            Measured rows unchanged, with their noise as σ; inferred ones marked by `inferred`, σ their standard
-            deviation.
+            Measured values unchanged, with σ as it was, NaN where it was unknown; inferred ones marked by `inferred`,
+            σ their standard deviation.
 
         Raises:
             FitmatError: not as many unit vectors above the surface of both, no finite fit, or no likelihood.

@@ -209,7 +209,7 @@ def test_convert_completes_a_table(run: Run, sparse: Path) -> None:
     first, last = numbers("sparse.csv"), numbers("whole.csv")
     assert last["theta_o"] == pytest.approx(first["theta_o"], abs=GROUPED)
     inferred = last["inferred"] == 1
-    found, sd, meant = last["brdf"], last["sigma"], first["brdf"]
+    found, sd, meant = last["brdf"], last["inferred_sd"], first["brdf"]
     assert found[~inferred] == pytest.approx(meant[~inferred], rel=SEVEN_DIGITS)
     assert np.mean(np.abs(found - meant)[inferred] < 2.0 * np.hypot(sd, first["sigma"])[inferred]) > 0.8
 

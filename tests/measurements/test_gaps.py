@@ -75,18 +75,43 @@ def test_tables_mark_what_was_inferred_and_other_formats_have_it_beside_them(tmp
     whole = grid()
     marked = fm.Measurements(
         whole.wi, whole.wo, whole.value, 0.01 * whole.value, whole.valid, whole.channels,
-        inferred=np.arange(whole.n_samples) % 2 == 1,
+        inferred=(np.arange(whole.n_samples) % 2 == 1)[:, None],
     )  # fmt: skip
     with pytest.warns(UserWarning, match="sigma not written"):
         fm.write(marked, tmp_path / "a.binary")
     fm.write(marked, tmp_path / "a.csv")
-    for table in (pl.read_parquet(tmp_path / "a.cells.parquet"), pl.read_csv(tmp_path / "a.csv")):
+    for table in (pl.read_parquet(tmp_path / "a.cells.parquet"), pl.read_csv(tmp_path / "a.csv", null_values="nan")):
         assert table["inferred"].to_list() == [0.0, 1.0] * 22 + [0.0]
-        assert table["sigma"].to_numpy() == pytest.approx(0.01 * whole.value[:, 0], rel=1e-6)
+        for name, rows in (("sigma", slice(None, None, 2)), ("inferred_sd", slice(1, None, 2))):
+            assert table[name].to_numpy()[rows] == pytest.approx(0.01 * whole.value[rows, 0], rel=1e-6)
     back = fm.read(tmp_path / "a.cells.parquet")
     assert (back.value[::2] == whole.value[::2]).all()
     assert back.valid[:, 0].tolist() == [True, False] * 22 + [True]
     assert not (tmp_path / "a.csv.cells.parquet").exists()
+
+
+@pytest.mark.parametrize("names", [("r", "g"), ("front", "back")])
+@pytest.mark.parametrize("given", [True, False])
+def test_what_was_measured_beside_what_was_inferred_is_read_again(
+    names: tuple[str, str], given: bool, tmp_path: Path
+) -> None:
+    """A row of which one channel was inferred keeps the other, and a noise that nobody gave is not read as given."""
+    whole = grid()
+    value = whole.value * [1.0, 0.5]
+    inferred = np.zeros(value.shape, bool)
+    inferred[3, 1] = inferred[7] = True
+    sigma = np.where(inferred | given, 0.01 * value, np.nan)
+    marked = fm.Measurements(whole.wi, whole.wo, value, sigma, np.ones_like(inferred), names, inferred=inferred)
+    assert marked.sigma_given == given
+    for name in ("a.csv", "a.parquet"):
+        back = fm.read(fm.write(marked, tmp_path / name))
+        assert back.channels == names
+        assert (back.valid == ~inferred).all()
+        assert back.value[~inferred] == pytest.approx(value[~inferred], rel=1e-6)
+        assert back.masked == {"inferred, not measured": 2}
+        assert not any("not used" in said for said in (*back.notes, *back.warnings))
+        assert (back.sigma is not None) == given
+        assert back.sigma is None or back.sigma[~inferred] == pytest.approx(sigma[~inferred], rel=1e-6)
 
 
 def test_measured_cells_of_a_merl_file_are_those_without_completion() -> None:
@@ -116,7 +141,7 @@ def test_a_full_disk_leaves_neither_file(tmp_path: Path) -> None:
     resource = pytest.importorskip("resource", reason="no limits on this system")
     whole = grid()
     marked = fm.Measurements(
-        whole.wi, whole.wo, whole.value, None, whole.valid, whole.channels, inferred=np.ones(whole.n_samples, bool)
+        whole.wi, whole.wo, whole.value, None, whole.valid, whole.channels, inferred=np.ones(whole.value.shape, bool)
     )
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (500, limits[1]))

@@ -17,9 +17,8 @@ from fitmat.text import visible
 FLAT = 1e-6
 """Radians; an azimuth this close to 0 or π is written as the sign of theta_o."""
 
-
-INFERRED = "inferred"
-"""The column that tells what was inferred from what was measured."""
+INFERRED, INFERRED_SD = "inferred", "inferred_sd"
+"""The columns that tell what was inferred from what was measured, and how well it is known."""
 
 CHANNEL = "channel"
 """The column that names the channel of each row, where the header cannot."""
@@ -31,15 +30,17 @@ def columns(measurements: Measurements) -> dict[str, Shaped[np.ndarray, " n"]]:
     theta_i, theta_o, brdf (brdf_r, … for several channels) and, where known, sigma; in the plane of incidence theta_o
     is signed, positive on the mirror side, else phi follows it, or phi_i and phi_o where the light does not always come
     from azimuth 0. Masked values are NaN. Where a channel's name would not be known again behind brdf_ or sigma_, each
-    row is one value, and a column `channel` says of which channel. Where rows were inferred, a column `inferred` has
-    1 for these and 0 for what was measured.
+    row is one value, and a column `channel` says of which channel. Where values were inferred, a column `inferred` has
+    1 for these and 0 for what was measured, or one for each channel where they differ; `inferred_sd` is the standard
+    deviation of these, and sigma the noise of what was measured, where it is known.
     """
     angles = {name: np.rad2deg(angle) for name, angle in _angles(measurements).items()}
     m, names = measurements, measurements.channels
-    if m.inferred is not None:
-        angles |= {INFERRED: m.inferred.astype(float)}
-    numbers = {"brdf": m.value} if m.sigma is None else {"brdf": m.value, "sigma": m.sigma}
-    numbers = {kind: np.where(m.valid, number, np.nan) for kind, number in numbers.items()}
+    numbers = {kind: np.where(m.valid, number, np.nan) for kind, number in _numbers(m).items()}
+    if m.inferred is not None and (m.inferred == m.inferred[:, :1]).all():
+        angles |= {INFERRED: m.inferred[:, 0].astype(float)}
+    elif m.inferred is not None:
+        numbers |= {INFERRED: m.inferred.astype(float)}
     if names == default_channels(1):
         return angles | {kind: number[:, 0] for kind, number in numbers.items()}
     known = all(names) and all(
@@ -51,6 +52,15 @@ def columns(measurements: Measurements) -> dict[str, Shaped[np.ndarray, " n"]]:
     repeated = {name: np.repeat(angle, len(names)) for name, angle in angles.items()}
     labels = np.tile(np.array(names, dtype=object), m.n_samples)
     return repeated | {kind: number.ravel() for kind, number in numbers.items()} | {CHANNEL: labels}
+
+
+def _numbers(m: Measurements) -> dict[str, Shaped[np.ndarray, "n c"]]:
+    """Values, σ of what was measured where it is known, and that of what was inferred."""
+    sigma = {} if m.sigma is None else {"sigma": m.sigma}
+    if m.sigma is not None and m.inferred is not None:
+        sigma = {"sigma": np.where(m.inferred, np.nan, m.sigma)} if m.sigma_given else {}
+        sigma |= {INFERRED_SD: np.where(m.inferred, m.sigma, np.nan)}
+    return {"brdf": m.value, **sigma}
 
 
 def _angles(measurements: Measurements) -> dict[str, Shaped[np.ndarray, " n"]]:
@@ -86,9 +96,16 @@ def dump(measurements: Measurements, comments: Iterable[str] = ()) -> str:
         table[CHANNEL] = np.array([_cell(name) for name in table[CHANNEL]], dtype=object)
     angles = [name for name in table if name.startswith(("theta", "phi"))]
     rounded = {name: np.round(column, 6) + 0.0 if name in angles else column for name, column in table.items()}
-    line = ",".join("%.9g" if name in (*angles, INFERRED) else "%s" if name == CHANNEL else "%.6e" for name in table)
+    line = ",".join(
+        "%.9g" if name in angles or _counts(name) else "%s" if name == CHANNEL else "%.6e" for name in table
+    )
     rows = [line % row for row in zip(*(column.tolist() for column in rounded.values()), strict=True)]
     return "\n".join([*(f"# {comment}" for comment in comments), ",".join(table), *rows, ""])
+
+
+def _counts(name: str) -> bool:
+    """Whether a column is 1 or 0."""
+    return name.startswith(INFERRED) and not name.startswith(INFERRED_SD)
 
 
 def refuse_lost(measurements: Measurements, back: Sequence[str | None]) -> None:

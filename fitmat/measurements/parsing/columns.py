@@ -19,7 +19,7 @@ EXAMPLE = 'columns="theta_i=Zenith,theta_o=3" (--columns)'
 _RIVALS = (VALUES, *ELEVATIONS.items(), ("wavelength", "channel"), ("phi", "phi_i"), ("phi", "phi_o"), ("sigma",))
 
 
-MARKS = ("valid", "invalid", "inferred", "wavelength", "channel")
+MARKS = ("valid", "invalid", "wavelength", "channel")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,7 +32,8 @@ class Columns:
         sigmas: Channel → column of its σ; empty where there is none.
         references: Channel → column of the reading of a white panel in the same geometry; empty where there is none.
         reference_sigmas: Channel → column of that reading's σ.
-        marks: valid, invalid, inferred, wavelength, channel, where given.
+        inferred: Channel → column that is not 0 where the value was inferred, not measured; empty where there is none.
+        marks: valid, invalid, wavelength, channel, where given.
         quantity: One of `QUANTITIES`, or "signal", which becomes "panel_ratio" by its reference.
         unused: The columns that play no part.
     """
@@ -42,6 +43,7 @@ class Columns:
     sigmas: dict[str, int]
     references: dict[str, int]
     reference_sigmas: dict[str, int]
+    inferred: dict[str, int]
     marks: dict[str, int]
     quantity: str
     unused: tuple[int, ...]
@@ -64,11 +66,12 @@ def assign(table: Table, columns: str | Mapping[str, str | int] | None, quantity
     if len(marks.keys() & {"wavelength", "channel"}) + any(values) > 1:
         expected = "expected one channel per column, or one wavelength or channel column"
         raise ReadError(f"{table.source}: channels named in two ways, {expected}. Remove one of them.")
-    sigmas, references, spreads = (_beside(table, kind, found, values) for kind in BESIDE)
+    sigmas, references, spreads, inferred, known = (_beside(table, kind, found, values) for kind in BESIDE)
     _refuse_unreferenced(table, quantity, references)
-    used = {c for group in (angles, values, sigmas, references, spreads, marks) for c in group.values()}
+    groups = (angles, values, sigmas, references, spreads, inferred, known, marks)
+    used = {c for group in groups for c in group.values()}
     unused = tuple(c for c in range(len(table.names)) if c not in used)
-    return Columns(angles, values, sigmas, references, spreads, marks, quantity, unused)
+    return Columns(angles, values, sigmas, references, spreads, inferred, marks, quantity, unused)
 
 
 def roles(table: Table, columns: str | Mapping[str, str | int] | None) -> dict[Role, int]:

@@ -44,11 +44,12 @@ ALIASES = {
     "valid": (),
     "invalid": ("flag",),
     "inferred": (),
+    "inferred_sd": (),
 }
 """Our name → its aliases; letter case, separators, Greek letters, a final "angle" and units do not matter."""
 
 VALUES = (*QUANTITIES, "signal", "value")
-BESIDE = ("sigma", "reference", "sigma_reference")
+BESIDE = ("sigma", "reference", "sigma_reference", "inferred", "inferred_sd")
 _KINDS = {alias.replace("_", ""): kind for kind, others in ALIASES.items() for alias in (kind, *others)}
 _GREEK = str.maketrans({"θ": "theta", "ϑ": "theta", "φ": "phi", "ϕ": "phi", "λ": "lambda", "σ": "sigma"})
 _CHANNELS = {"red": "r", "green": "g", "blue": "b"} | {name: name for name in "rgbxyz"}

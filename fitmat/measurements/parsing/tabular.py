@@ -19,6 +19,9 @@ from fitmat.measurements.parsing.table import Table
 from fitmat.measurements.parsing.wavelengths import in_nanometres, refuse_unlike
 from fitmat.measurements.samples import default_channels
 
+INFERRED = "inferred, not measured"
+"""Why what completes a table is masked: a fit to it would find the model that filled it."""
+
 HIDDEN = 0.3
 """Share of the rows beyond 90° from the normal from which the angle may be another one."""
 
@@ -56,9 +59,9 @@ def recorded(table: Table, layout: Columns, options: Options, *, doubted: bool) 
     scale = _scale(table, layout, options)
     value, sigma = _stacked(table, layout.values), _stacked(table, layout.sigmas) if layout.sigmas else None
     doubts = {"flagged invalid": np.broadcast_to(_flagged(table, layout.marks)[:, None], value.shape)}
-    if "inferred" in layout.marks:
-        inferred = np.nan_to_num(table.truths(layout.marks["inferred"])) != 0
-        doubts |= {"inferred, not measured": np.broadcast_to(inferred[:, None], value.shape)}
+    if layout.inferred:
+        marks = [np.nan_to_num(table.truths(column)) != 0 for column in layout.inferred.values()]
+        doubts |= {INFERRED: np.stack(marks, axis=1)}
     doubts |= sentinels(value)
     value, sigma = scales.plain(value, sigma, scale)
     if layout.quantity == "signal":
