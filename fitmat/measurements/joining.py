@@ -54,12 +54,15 @@ def join(parts: Sequence[Measurements]) -> Measurements:
     for conflict in _conflicts(parts, names):
         raise ReadError(conflict)
     order = [[part.channels.index(name) for name in parts[0].channels] for part in parts]
-    sigmas = [part.sigma for part in parts if part.sigma is not None]
+    horizontal, sigma, inferred = (
+        _stacked([getattr(part, name) for part in parts], parts, order, blank)
+        for name, blank in (("horizontal", np.nan), ("sigma", np.nan), ("inferred", False))
+    )
     return Measurements(
         wi=np.concatenate([part.wi for part in parts]),
         wo=np.concatenate([part.wo for part in parts]),
         value=np.concatenate([part.value[:, places] for part, places in zip(parts, order, strict=True)]),
-        sigma=np.concatenate([s[:, places] for s, places in zip(sigmas, order, strict=True)]) if sigmas else None,
+        sigma=sigma,
         valid=np.concatenate([part.valid[:, places] for part, places in zip(parts, order, strict=True)]),
         channels=parts[0].channels,
         source=" + ".join(names) if len(names) <= NAMED else f"{names[0]} + {len(names) - 1} others",
@@ -72,14 +75,18 @@ def join(parts: Sequence[Measurements]) -> Measurements:
         instrument=parts[0].instrument,
         warnings=_told([part.warnings for part in parts], names),
         stated=tuple(stated for part in parts for stated in part.stated),
-        horizontal=_horizontal(parts, order),
+        horizontal=horizontal,
+        inferred=inferred,
     )
 
 
-def _horizontal(parts: Sequence[Measurements], order: list[list[int]]) -> np.ndarray | None:
-    if all(part.horizontal is None for part in parts):
+def _stacked(
+    given: Sequence[np.ndarray | None], parts: Sequence[Measurements], order: list[list[int]], blank: float | bool
+) -> np.ndarray | None:
+    """What some parts have, with blanks for the others; None where none has it."""
+    if all(one is None for one in given):
         return None
-    each = [np.full(part.value.shape, np.nan) if part.horizontal is None else part.horizontal for part in parts]
+    each = [np.full(part.value.shape, blank) if one is None else one for one, part in zip(given, parts, strict=True)]
     return np.concatenate([one[:, places] for one, places in zip(each, order, strict=True)])
 
 
@@ -135,8 +142,8 @@ def _conflicts(parts: Sequence[Measurements], names: Sequence[str]) -> Iterator[
             got = f"channels {listed(first.channels)} beside {listed(other.channels)}"
             remedy = "Fit them one by one, or choose the columns that they share (--columns)"
             yield f"{pair}: {got}, expected the same in every file that is joined. {remedy}."
-        if (other.sigma is None) != (first.sigma is None):
-            lacking, having = (its, name) if other.sigma is None else (name, its)
+        if other.sigma_given != first.sigma_given:
+            lacking, having = (name, its) if other.sigma_given else (its, name)
             remedy = f"Add it to {lacking}, or rename it in {having} to leave it out"
             yield f"{pair}: sigma in {having} only, expected it in every file that is joined, or in none. {remedy}."
         if other.instrument != first.instrument:

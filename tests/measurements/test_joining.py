@@ -54,6 +54,24 @@ def test_what_is_masked_assumed_or_doubted_names_its_file(write: Write) -> None:
         read([one, write("other.csv", PLAIN + "60,50,x\n")])
 
 
+def test_what_was_inferred_stays_marked() -> None:
+    """Of one part, whose channels are in another order; its sd is no noise that the other part would lack."""
+    value = np.array([[0.1, 0.2], [0.3, 0.4]])
+    plain = from_arrays([0.5, 0.5], [0.1, 0.2], value, channels=["r", "g"], source="plain")
+    inferred = np.array([[False, False], [True, False]])
+    turned = from_arrays([0.9, 0.9], [0.1, 0.2], value, channels=["g", "r"], source="turned")
+    filled = dataclasses.replace(turned, inferred=inferred, sigma=np.where(inferred, 0.01, np.nan))
+    for parts, rows in (([plain, filled], slice(2, 4)), ([filled, plain], slice(0, 2))):
+        found = join(parts)
+        k = found.channels.index("g")
+        assert found.inferred is not None
+        assert found.inferred[rows, k].tolist() == [False, True]
+        assert np.count_nonzero(found.inferred) == 1
+        assert found.sigma is not None
+        assert (np.isfinite(found.sigma) == found.inferred).all()
+        assert not found.sigma_given
+
+
 def test_files_of_one_name_are_told_apart_by_their_folders(write: Write) -> None:
     one, other = write("monday/scan.csv", PLAIN), write("friday/scan.csv", PLAIN + "40,10,\n")
     found = read([one, other])
