@@ -12,7 +12,7 @@ import numpy as np
 
 from fitmat._types import Progress
 from fitmat.errors import ModelError
-from fitmat.measurements import writing
+from fitmat.measurements import inferred, writing
 from fitmat.measurements.reader import read
 from fitmat.measurements.samples import Measurements
 from fitmat.text import visible
@@ -60,6 +60,11 @@ def written(
         told += [completion(measurements)]
         if (beside := writing.marks(out)) is not None:
             told += [f"Which of them were inferred, and how well each is known: {visible(str(beside))}"]
+    elif lost := inferred.rows(measurements):
+        told += [
+            f"{lost} rows hold values that were inferred, not measured, which are not written: only what was measured "
+            f"is converted. They are still in {measurements.source}; --complete infers them anew."
+        ]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the losses are among the lines
         writing.write(measurements, out, force=force)
@@ -90,11 +95,11 @@ def completed(measurements: Measurements, out: Path, model: str, say: Progress, 
 
 def completion(m: Measurements) -> str:
     """How much was inferred, and how well it is known, as a sentence."""
-    inferred = np.zeros(m.value.shape, bool) if m.inferred is None else m.inferred
-    sd = np.zeros((1, 1)) if m.sigma is None else m.sigma[inferred]
-    value = m.value[inferred]
+    filled = np.zeros(m.value.shape, bool) if m.inferred is None else m.inferred
+    sd = np.zeros((1, 1)) if m.sigma is None else m.sigma[filled]
+    value = m.value[filled]
     relative = np.where(sd < value, sd / np.where(value > 0.0, value, 1.0), 1.0)
-    some, every = inferred.any(axis=1), inferred.all(axis=1)
+    some, every = filled.any(axis=1), filled.all(axis=1)
     rows = f"{np.count_nonzero(~some)} rows as measured, {np.count_nonzero(some)} inferred"
     if partly := np.count_nonzero(some & ~every):
         rows += f" ({partly} of them in some channels only)"

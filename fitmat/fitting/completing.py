@@ -19,6 +19,7 @@ from fitmat.fitting.stabilising import from_stabilised, spread, stabilised
 from fitmat.maths.blas import one_thread
 from fitmat.maths.directions import zenith
 from fitmat.maths.kriging import kriging
+from fitmat.measurements.inferred import measured_only
 from fitmat.measurements.noise import at_level, channel_laws
 from fitmat.measurements.samples import Measurements
 from fitmat.models.values import at, values, widths
@@ -80,7 +81,7 @@ def completed(
     Raises:
         ModelError: the fit is not finite, or its loss is an objective.
     """
-    m = fit.measurements if measured is None else measured
+    m = fit.measurements if measured is None else measured_only(measured)
     if not (fit.finite and fit.loss.posterior):
         got = f"the loss {fit.loss.name} gives no interval" if fit.finite else f"{fit.name} found no finite fit"
         raise ModelError(f"{m.source}: nothing can be inferred, for {got}; expected one that does. Take another.")

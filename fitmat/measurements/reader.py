@@ -14,7 +14,7 @@ import polars as pl
 
 from fitmat import arguments
 from fitmat.errors import ReadError
-from fitmat.measurements import joining
+from fitmat.measurements import inferred, joining
 from fitmat.measurements.blocked import without_blocked
 from fitmat.measurements.formats import (
     alta,
@@ -216,7 +216,7 @@ def measured(recording: Recording, options: Options) -> Measurements:
 
 
 def measurements_of(given: object) -> Measurements:
-    """Measurements, or those that a path leads to.
+    """Measurements, or those that a path leads to; what completes them is masked.
 
     Raises:
         FitmatError: as `read`, or it is neither.
@@ -224,7 +224,7 @@ def measurements_of(given: object) -> Measurements:
     if isinstance(given, str | os.PathLike):
         return read(given)
     arguments.kind("measurements", given, Measurements, str, os.PathLike)
-    return cast(Measurements, given)
+    return inferred.measured_only(cast(Measurements, given))
 
 
 def _recording(source: Source, columns: str | Mapping[str, str | int] | None, options: Options) -> Recording:

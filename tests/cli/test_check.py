@@ -214,6 +214,16 @@ def test_convert_completes_a_table(run: Run, sparse: Path) -> None:
     assert np.mean(np.abs(found - meant)[inferred] < 2.0 * np.hypot(sd, first["sigma"])[inferred]) > 0.8
 
 
+def test_converting_a_completed_table_says_what_is_left_out(run: Run) -> None:
+    Path("whole.csv").write_text("theta_i,theta_o,brdf,inferred\n10,10,1,0\n10,20,2,1\n20,10,1,0\n20,20,3,1\n")
+    ended = run("convert", "whole.csv", "again.csv")
+    assert ended.code == 0
+    assert "2 rows hold values that were inferred, not measured, which are not written: only what was" in ended.out
+    assert "They are still in whole.csv; --complete infers them anew." in ended.out
+    Path("other.csv").write_text("theta_i,theta_o,brdf\n30,10,1\n30,20,2\n")
+    assert "2 rows hold values that were inferred" in run("convert", "whole.csv", "other.csv", "b.csv", "--join").out
+
+
 def test_what_cannot_be_completed_is_one_sentence(run: Run, sparse: Path) -> None:
     whole = run("convert", sparse, "b.csv", "--complete")
     assert_refused(

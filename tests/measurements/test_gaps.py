@@ -1,5 +1,6 @@
 """Gaps: what a grid, the table's or the format's, holds and nobody measured; what is complete, or none, is refused."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -112,6 +113,22 @@ def test_what_was_measured_beside_what_was_inferred_is_read_again(
         assert not any("not used" in said for said in (*back.notes, *back.warnings))
         assert (back.sigma is not None) == given
         assert back.sigma is None or back.sigma[~inferred] == pytest.approx(sigma[~inferred], rel=1e-6)
+
+
+def test_what_completes_measurements_is_not_fitted() -> None:
+    """In memory as from a file; in a second completion it is inferred anew."""
+    whole = grid()
+    m = fm.from_arrays(whole.theta_i, whole.theta_o, np.full((whole.n_samples, 1), 0.1), phi=whole.phi)
+    odd = (np.arange(m.n_samples) % 3 == 1)[:, None]
+    filled = dataclasses.replace(m, value=np.where(odd, 0.5, 0.1), inferred=odd, sigma=np.where(odd, 0.01, np.nan))
+    found = fm.fit(filled, "lambert")
+    assert found.values == pytest.approx([0.1 * np.pi], rel=1e-6)
+    assert (found.measurements.n_valid, found.measurements.sigma) == (30, None)
+    assert found.measurements.masked == {"inferred, not measured": 15}
+    assert fm.examine(filled).measurements.n_valid == 30
+    again = fm.laplace(found, seed=0).complete(m.wi[1:2], m.wo[1:2], filled)
+    assert again.n_samples == 31
+    assert again.value[-1, 0] == pytest.approx(0.1, rel=1e-3)
 
 
 def test_measured_cells_of_a_merl_file_are_those_without_completion() -> None:

@@ -20,6 +20,7 @@ from fitmat.judgement.laboratories.agreement import Agreement, agreement
 from fitmat.judgement.laboratories.scales import LEVEL, Scale, scales_of
 from fitmat.judgement.multiplicity import adjusted_for_many
 from fitmat.judgement.propagation import OF_INSTRUMENT
+from fitmat.measurements.inferred import measured_only
 from fitmat.measurements.instrument import UNKNOWN_SCALE
 from fitmat.measurements.samples import Measurements
 from fitmat.models.registry import model
@@ -186,6 +187,7 @@ def compare_laboratories(
     arguments.kind("measurements", measurements, list, tuple)
     for one in measurements:
         arguments.kind("one of measurements", one, Measurements)
+    measurements = [measured_only(one) for one in measurements]
     arguments.kind("name", name, str)
     arguments.kind("names", names, list, tuple, optional=True)
     called = tuple(visible(n) for n in (names or [m.source for m in measurements]))

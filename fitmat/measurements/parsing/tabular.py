@@ -9,6 +9,7 @@ import numpy as np
 
 from fitmat.errors import ReadError
 from fitmat.maths.directions import from_angles
+from fitmat.measurements import inferred
 from fitmat.measurements.options import Options
 from fitmat.measurements.parsing import contents, scales, units, unused
 from fitmat.measurements.parsing.angles import ROUNDING, directions, unsaid_side
@@ -18,9 +19,6 @@ from fitmat.measurements.parsing.recording import Recording, pivot, sentinels
 from fitmat.measurements.parsing.table import Table
 from fitmat.measurements.parsing.wavelengths import in_nanometres, refuse_unlike
 from fitmat.measurements.samples import default_channels
-
-INFERRED = "inferred, not measured"
-"""Why what completes a table is masked: a fit to it would find the model that filled it."""
 
 HIDDEN = 0.3
 """Share of the rows beyond 90° from the normal from which the angle may be another one."""
@@ -61,7 +59,7 @@ def recorded(table: Table, layout: Columns, options: Options, *, doubted: bool) 
     doubts = {"flagged invalid": np.broadcast_to(_flagged(table, layout.marks)[:, None], value.shape)}
     if layout.inferred:
         marks = [np.nan_to_num(table.truths(column)) != 0 for column in layout.inferred.values()]
-        doubts |= {INFERRED: np.stack(marks, axis=1)}
+        doubts |= {inferred.REASON: np.stack(marks, axis=1)}
     doubts |= sentinels(value)
     value, sigma = scales.plain(value, sigma, scale)
     if layout.quantity == "signal":
