@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from lanes import LANES, mapped
+from lanes import mapped, programmed
 from scipy.integrate import quad
 from selection import always
 
@@ -39,8 +39,11 @@ QUADRATURE = 1e-8
 AXES = {"tilt": {"tilt_x": 2.0}, "disney": {"anisotropic": 0.5}}
 """Parameters by which models show their axes that hide them by default."""
 
+COATS = {"plastic", "varnish", "rough-varnish"}
+"""What comes back to their base is solved once for all pairs, by a program; others are tried operation by operation."""
+
 PLAIN = {"lambert+phong", *(n for n, lobe in LOBES.items() if not ("-aniso" in n and lobe.fresnel_suffix(n)))}
-PLAIN -= {"plastic", "varnish", "rough-varnish"}
+PLAIN -= COATS
 """Tried in every run: all but brushed lobes with another Fresnel term, which is the same code as in the others, and but
 coats, which take long."""
 
@@ -139,7 +142,7 @@ def test_gradients_are_finite_differences(name: str, hemisphere: Hemisphere, sin
     """Every parameter of every lobe, drawn within its bounds; reverse mode, and forward mode the same."""
     model = fm.model(name)
     wi, wo = _directions(hemisphere, singular)
-    block, draws = (256, 1) if name == "plastic" else (LANES, 4)  # each of its rows takes megabytes
+    every_pair, draws = programmed if name in COATS else mapped, 4
 
     def one(values: jax.Array, wi: jax.Array, wo: jax.Array) -> jax.Array:
         return jnp.sum(with_vector(model, values)(wi, wo))
@@ -151,10 +154,10 @@ def test_gradients_are_finite_differences(name: str, hemisphere: Hemisphere, sin
     low, span, count = every.low, every.span, len(every.low)
     drawn = low + span * rng.uniform(0.02, 0.98, (draws, count))
     points = np.array([every.physical(jnp.array(natural)) for natural in drawn])
-    value, slopes = mapped(jax.value_and_grad(one), [points], [wi, wo], block)
+    value, slopes = every_pair(jax.value_and_grad(one), [points], [wi, wo])
     value, slopes = value[:, None], np.moveaxis(slopes, 2, 1)
     each = [np.repeat(points, count, axis=0), np.tile(np.eye(count), (draws, 1))]
-    forward = mapped(along, each, [wi, wo], block).reshape(slopes.shape)
+    forward = every_pair(along, each, [wi, wo]).reshape(slopes.shape)
     np.testing.assert_allclose(forward, slopes, rtol=EXACT, atol=EXACT * np.abs(slopes).max())
     # A tangent need not turn far to be felt: by the width of the lobe.
     angles = np.array([entry.param.unit == "°" for entry in entries(model) for _ in range(entry.size)])
@@ -162,7 +165,7 @@ def test_gradients_are_finite_differences(name: str, hemisphere: Hemisphere, sin
     sizes = np.where(angles, widths, np.abs(points))
     steps = 1e-4 * sizes[..., None]
     moved = points[:, None, None] + np.array([-2, -1, 1, 2])[:, None] * steps[..., None] * np.eye(count)[:, None]
-    at = mapped(one, [moved.reshape(-1, count)], [wi, wo], block).reshape(draws, count, 4, -1)
+    at = every_pair(one, [moved.reshape(-1, count)], [wi, wo]).reshape(draws, count, 4, -1)
     expected = (at[:, :, 0] - 8 * at[:, :, 1] + 8 * at[:, :, 2] - at[:, :, 3]) / (12 * steps)
     scale = np.abs(slopes) + (value + UNDERFLOW) / sizes[..., None]
     allowed = TABULATED if "-kc" in name or "-turquin" in name else DIFFERENCES
@@ -280,5 +283,6 @@ def test_only_models_with_axes_change_when_both_directions_turn(name: str, hemis
     turn = np.array([[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
     with_axes: dict[str, Any] = next((axes for family, axes in AXES.items() if family in name), {})
     model = fm.model(examples(name)[0], **with_axes)
-    straight, turned = (mapped(model, [], [wi @ turning, wo @ turning]) for turning in (np.eye(3), turn))
+    every_pair = programmed if name in COATS else mapped
+    straight, turned = (every_pair(model, [], [wi @ turning, wo @ turning]) for turning in (np.eye(3), turn))
     assert model.isotropic == np.allclose(turned, straight, rtol=TURNED)

@@ -1,5 +1,6 @@
 """Coats against Mitsuba's smooth plastic, closed forms of internal reflection, scipy's quadrature, and by hand."""
 
+import functools
 from types import ModuleType
 from typing import Any
 
@@ -14,6 +15,7 @@ from selection import always
 import fitmat as fm
 from fitmat.errors import ModelError
 from fitmat.fitting.coordinates import coordinates
+from fitmat.maths.programs import UNFUSED
 from fitmat.models.albedo import albedo
 from fitmat.models.around.coat import RoughCoat, SmoothCoat
 from fitmat.models.around.face import face_albedo
@@ -274,7 +276,7 @@ def test_gradients_are_finite_differences(hemisphere: Hemisphere, singular: Pair
     special_i, special_o = (jnp.array(np.array(column)) for column in zip(*singular.values(), strict=True))
     wi, wo = jnp.array(hemisphere(15, 13)), jnp.array(hemisphere(15, 14))
 
-    @jax.jit
+    @functools.partial(jax.jit, compiler_options=UNFUSED)
     def both(point: jax.Array) -> tuple[jax.Array, jax.Array]:
         def values(point: jax.Array) -> tuple[jax.Array, jax.Array]:
             every = jnp.concatenate([wi, special_i]), jnp.concatenate([wo, special_o])

@@ -1,5 +1,6 @@
 """Coats over bases that mirror, against photons followed one by one, and what must hold at the ends of everything."""
 
+import functools
 from types import ModuleType
 from typing import Any
 
@@ -13,6 +14,7 @@ from selection import always
 import fitmat as fm
 from fitmat._types import Scalar, Spectrum, Vec3
 from fitmat.maths.directions import from_angles
+from fitmat.maths.programs import UNFUSED
 from fitmat.models.albedo import albedo
 from fitmat.models.around.coat import RoughCoat, SmoothCoat
 from fitmat.models.around.varnish import Varnish
@@ -227,7 +229,7 @@ def test_values_and_slopes_are_finite_at_all_ends(name: str) -> None:
     wi, wo = (jnp.array(np.array(column)) for column in zip(*singular().values(), strict=True))
     found = entries(model)
 
-    @jax.jit
+    @functools.partial(jax.jit, compiler_options=UNFUSED)
     def both(point: jax.Array) -> Any:
         def total(point: jax.Array, wi: jax.Array, wo: jax.Array) -> jax.Array:
             return jnp.sum(evaluate_pairs(with_vector(model, point), wi, wo))

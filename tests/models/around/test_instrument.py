@@ -267,7 +267,7 @@ def test_a_tilt_beside_an_error_of_the_angles_is_refused() -> None:
 
 @pytest.mark.study
 def test_errors_of_the_angles_are_covered() -> None:
-    """95 % intervals over 500 data sets with offsets and jitter of 0.2° drawn for each: where that is said, and not.
+    """95 % intervals over 500 data sets with offsets and jitter of 0.2° drawn for each; in 100 of them also unsaid.
 
     Where it is not, readings that count as independent hold the truth far less often; what the correlation of the
     misfit adds holds it, by intervals that are wider than those of the fit that is told.
@@ -279,6 +279,8 @@ def test_errors_of_the_angles_are_covered() -> None:
         m = fm.simulate(fm.model("lambert+ggx", **truth), THETA_I, THETA_O, relative_noise=0.01, absolute_noise=1e-3,
                         seed=seed, instrument=said)  # fmt: skip
         told.append([abs(z) < 1.96 for z in deviations(fm.fit(m, "lambert+ggx"), **truth)])
+        if seed >= 100:
+            continue
         blind = fm.fit(dataclasses.replace(m, instrument=IDEAL), "lambert+ggx")
         sd, places = np.sqrt(np.diagonal(blind.likelihood_covariance)), {e.name: e.place.start for e in blind.entries}
         alone.append([abs(blind.values[places[n]] - true) < 1.96 * sd[places[n]] for n, true in truth.items()])
@@ -286,7 +288,8 @@ def test_errors_of_the_angles_are_covered() -> None:
     print(covered)
     chance = 4.0 * np.sqrt(0.95 * 0.05 / 500)  # four standard errors
     assert all(abs(share - 0.95) <= chance for share in covered[0].values())
-    assert min(covered[1].values()) < 0.7
+    least = min(covered[1].values())
+    assert least + 4.0 * np.sqrt(least * (1.0 - least) / 100) < 0.7
 
 
 def test_an_instrument_says_what_it_does() -> None:
