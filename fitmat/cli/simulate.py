@@ -79,12 +79,12 @@ def truth(
             got = f"--dispersion {dispersion} beside {'--film' if ior is None else '--ior'}"
             raise ModelError(f"{got}, which says an index already: expected one of them. Leave one out.")
         return _lawful(name, values, masking, channels, dispersion), channels
+    if film is not None and nm is None and "-film" in name:
+        raise ModelError(f"--film {film} without --wavelengths, expected where the channels are. Add it.")
     held: dict[str, np.ndarray] = {}
     if ior is not None:
         ((name, held),) = of_material(name, ior, channels).items()
     if film is not None:
-        if nm is None and "-film" in name:
-            raise ModelError(f"--film {film} without --wavelengths, expected where the channels are. Add it.")
         made = of_film(name, film, channels)
         refuse_no_film(film, {name: made})
         held = held | made

@@ -8,7 +8,7 @@ import warnings
 import numpy as np
 
 from fitmat.errors import ModelError, ReadAs
-from fitmat.measurements.samples import IN_PLANE, Measurements
+from fitmat.measurements.samples import IN_PLANE, Measurements, default_channels
 from fitmat.models import spectral
 from fitmat.models.in_rgb import WAYS, fresnel_in_rgb
 from fitmat.models.parameters import entries
@@ -38,7 +38,7 @@ def of_material(name: str, material: str, channels: tuple[str, ...]) -> Known:
 
     Every lobe with a Fresnel term takes the index. A metal in a lobe with the dielectric term turns it into
     `-conductor`. In r, g and b it is the index whose curve comes closest to what the channel sees of the spectrum
-    (`spectral.channel_indices`); F0 and F82 are what it sees, at most 1.
+    (`spectral.channel_indices`); F0 and F82 are what it sees, at most 1. Where a single channel is taken, is said.
 
     Args:
         name: Of the model.
@@ -78,13 +78,16 @@ def of_material(name: str, material: str, channels: tuple[str, ...]) -> Known:
             known[entry.name] = value if entry.size == len(channels) else np.mean(value, keepdims=True)
     if set(channels) == set(spectral.RGB):
         _say_what_rgb_cannot_hold(material, {key.rpartition(".")[2] for key in known})
+    elif channels == default_channels(1):
+        _say_where(f"--ior {material}", channels, indices)
     return {name: known}
 
 
 def of_film(name: str, material: str, channels: tuple[str, ...]) -> dict[str, np.ndarray]:
     """What a named film holds of a model: film_eta and film_b, Cauchy's law closest to the literature's η, and κ.
 
-    Least squares at the channels' wavelengths, B ≥ 0; κ is their mean. How far that is from the literature is said.
+    Least squares at the channels' wavelengths, B ≥ 0; κ is their mean. How far that is from the literature is said,
+    and where a single channel is taken.
 
     Args:
         name: Of a model with a film.
@@ -102,6 +105,8 @@ def of_film(name: str, material: str, channels: tuple[str, ...]) -> dict[str, np
         return {}
     um = 1e-3 * channel_wavelengths(channels)
     found = index(material, 1e3 * um)
+    if channels == default_channels(1):
+        _say_where(f"--film {material}", channels, found)
     basis = np.stack([np.ones_like(um), um**-2.0], axis=1)
     a, b = np.linalg.lstsq(basis, np.real(found), rcond=None)[0] if len(um) > 1 else (0.0, -1.0)
     if b < 0.0:
@@ -123,6 +128,14 @@ def of_film(name: str, material: str, channels: tuple[str, ...]) -> dict[str, np
     return {
         key if key in names else f"{part}.{key}": np.array([value]) for part in films for key, value in values.items()
     }
+
+
+def _say_where(flag: str, channels: tuple[str, ...], indices: np.ndarray) -> None:
+    """Warn with `ReadAs` that a channel without a wavelength is taken at one."""
+    (nm,), (index_,) = channel_wavelengths(channels), indices
+    taken = f"taken at {nm:g} nm, η = {index_.real:.4g}, κ = {index_.imag:.3g}"
+    elsewhere = "for another, --wavelengths of fitmat simulate, or the name of a table's column, as brdf_633"
+    warnings.warn(f"{flag}: {taken}, as the one channel has no wavelength; {elsewhere}.", ReadAs, stacklevel=3)
 
 
 def _say_what_rgb_cannot_hold(material: str, held: set[str]) -> None:

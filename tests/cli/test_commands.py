@@ -466,6 +466,14 @@ def test_simulated_spectra(run, tmp_path, told, index):
     np.testing.assert_allclose(found.value[0], np.abs((index - 1) / (index + 1)) ** 2 / np.pi, rtol=1e-6)
 
 
+def test_a_simulated_metal_says_its_wavelength_or_has_it_said(run, tmp_path):
+    told = ("simulate", "ggx", "--ior", "Au", "--theta-i", "0", "--theta-o", "0", "--noise", 0, "--floor", 0)
+    assert "--ior Au: taken at 550 nm" in run(*told, "--out", tmp_path / "a.csv").err
+    ended = run(*told, "--wavelengths", "450.9", "--out", tmp_path / "b.csv")
+    assert (ended.code, ended.err) == (0, "")
+    assert fm.read(tmp_path / "b.csv").channels == ("450.9",)
+
+
 def test_simulated_catalogue(run, tmp_path):
     ended = run("simulate", "--catalogue", tmp_path / "all")
     assert ended.code == 0

@@ -88,7 +88,8 @@ def test_both_tilts_are_free_off_the_plane() -> None:
 
 def test_models_without_an_index_stay_as_they_are() -> None:
     """Where at least one has one."""
-    known = prepare_known(["lambert+phong", "lambert+ggx"], _plane(0.0), ior="Au", tilt=True)
+    with pytest.warns(ReadAs, match="--ior Au: taken at 550 nm"):
+        known = prepare_known(["lambert+phong", "lambert+ggx"], _plane(0.0), ior="Au", tilt=True)
     assert list(known) == ["tilt-over-lambert+phong", "tilt-over-lambert+ggx-conductor"]
     assert set(known["tilt-over-lambert+ggx-conductor"]) == {"eta", "kappa", "tilt_y"}
     with pytest.raises(ModelError, match="no lobe with a refractive index"):
@@ -113,6 +114,15 @@ def test_what_a_law_leaves_of_a_film_is_said() -> None:
         of_film("ggx-film", "TiO2", tuple(f"{nm}" for nm in range(400, 701, 10)))
     with pytest.warns(ReadAs, match=r"off by 0\.0001\d? at most\.$"):
         of_film("ggx-film", "fused-silica", SPECTRUM)
+
+
+def test_where_a_channel_without_a_wavelength_is_taken_is_said() -> None:
+    """Gold at 548.6 nm is 0.43 + 2.455i, at 563.6 nm 0.35 + 2.683i (Johnson & Christy 1972, table I)."""
+    with pytest.warns(ReadAs, match=r"--ior Au: taken at 550 nm, η = 0\.42\d+, κ = 2\.4\d, as the one channel has no"):
+        of_material("ggx", "Au", ("value",))
+    held = pytest.warns(ReadAs, match="--film fused-silica: held")
+    with held, pytest.warns(ReadAs, match=r"--film fused-silica: taken at 550 nm, η = 1\.46, κ = 0, as"):
+        of_film("ggx-film", "fused-silica", ("value",))
 
 
 def test_one_wavelength_of_a_film_has_no_dispersion() -> None:

@@ -40,7 +40,8 @@ def test_options_go_to_the_models_that_have_them(measurements: Measurements) -> 
 
 
 def test_a_known_material_is_held_and_renames_its_model(measurements: Measurements) -> None:
-    jobs = plan("ggx,phong", measurements, ior="Au")
+    with pytest.warns(ReadAs, match="--ior Au: taken at 550 nm"):
+        jobs = plan("ggx,phong", measurements, ior="Au")
     assert list(jobs) == ["ggx-conductor", "phong"]
     assert sorted(jobs["ggx-conductor"]["fixed"]) == ["eta", "kappa"]
 
@@ -65,13 +66,13 @@ def test_options_that_concern_no_model(measurements: Measurements, chosen: dict,
 
 
 def test_what_a_material_says_is_not_said_again(measurements: Measurements) -> None:
-    with pytest.raises(
-        ModelError, match="--fix eta beside --ior, expected one of the two: the material says it already"
-    ):
+    said = pytest.warns(ReadAs, match="--ior N-BK7: taken at 550 nm")
+    with said, pytest.raises(ModelError, match="--fix eta beside --ior, expected one of the two: the material says it"):
         plan("ggx", measurements, ior="N-BK7", fixed={"eta": 1.5})
     spectrum = fm.from_arrays(0.5, [0.1, 0.2], np.ones((2, 3)), channels=("450", "550", "650"))
     refused = pytest.raises(ModelError, match="--fix film_eta beside --film, expected one of the two")
     with refused, pytest.warns(ReadAs, match="--film TiO2: held"):
         plan("ggx-film", spectrum, film="TiO2", fixed={"film_eta": 2.0})
-    with pytest.raises(ModelError, match=r"eta is fixed and has a prior \(--fix or --ior, and --prior\)"):
+    said = pytest.warns(ReadAs, match="--ior N-BK7: taken at 550 nm")
+    with said, pytest.raises(ModelError, match=r"eta is fixed and has a prior \(--fix or --ior, and --prior\)"):
         plan("ggx", measurements, ior="N-BK7", priors={"eta": (1.5, 0.1)})
