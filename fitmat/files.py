@@ -20,7 +20,7 @@ WORK = ".fitmat-"
 ABANDONED = 7 * 24 * 3600.0
 """Seconds after which such a folder, left by a killed run, is removed by a run of something else."""
 
-_LOCK, _DRAFT = "lock", "draft"
+_LOCK, _DRAFT, _OLD, _SWAP = "lock", "draft", "old", ".fitmat-swap"
 _DEVICES = Path("/dev")
 _TRIES, _WAIT = 10, 0.02
 
@@ -67,23 +67,19 @@ def new(target: Path, *, own: Callable[[Path], Sequence[str]], force: bool = Fal
     """
     place = Path(os.path.realpath(target))
     with contextlib.ExitStack() as held:
-        try:
+        with _refused(target):
             work = _work(place)
             held.enter_context(_locked(work, target))
             old = own(place) if _holds_anything(target, work, force) else ()
             _sweep(work.parent)
             draft = work / _DRAFT
             draft.mkdir()
-        except OSError as error:
-            raise OutputError(f"cannot write {target}: {_reason(error)}; choose another place with --out.") from error
-        try:
+        with _refused(target, "nothing was put there"):
             yield draft
             if work.parent == place:
                 _move_files(draft, place, old, own(draft))
             else:
                 _move_folder(draft, place)
-        except OSError as error:
-            raise OutputError(f"cannot write {target}: {_reason(error)}; nothing was put there.") from error
 
 
 @contextlib.contextmanager
@@ -94,11 +90,11 @@ def alone(target: Path) -> Iterator[None]:
         OutputError: another run writes into it, or it cannot be made.
     """
     with contextlib.ExitStack() as held:
-        try:
+        with _refused(target):
             target.mkdir(parents=True, exist_ok=True)
             held.enter_context(_locked(target / f"{WORK}run", target))
-        except OSError as error:
-            raise OutputError(f"cannot write {target}: {_reason(error)}; choose another place with --out.") from error
+            for left in target.glob(f".*{_SWAP}"):
+                _put_back(left)
         yield
 
 
@@ -106,22 +102,38 @@ def alone(target: Path) -> Iterator[None]:
 def replaced(folder: Path) -> Iterator[Path]:
     """A folder to write into that takes the place of another of that name when the block ends well, in two renamings.
 
+    Where it is killed between the two, the next, or `alone` of the folder around it, puts the old one back.
+
     Raises:
         OutputError: it cannot be written; what was there before is still there.
     """
-    draft, old = (folder.with_name(f".{folder.name}.{what}") for what in ("new", "old"))
+    work = folder.with_name(f".{folder.name}{_SWAP}")
+    with _refused(folder):
+        try:
+            _put_back(work)
+            work.mkdir()
+            yield work / _DRAFT
+            if folder.exists():
+                os.replace(folder, work / _OLD)
+            os.replace(work / _DRAFT, folder)
+        finally:
+            _put_back(work)
+
+
+def _put_back(work: Path) -> None:
+    """Remove what `replaced` works in; a folder in whose place nothing came is put back first."""
+    folder = work.with_name(work.name[1 : -len(_SWAP)])
+    if (work / _OLD).exists() and not folder.exists():
+        os.replace(work / _OLD, folder)
+    _remove(work)
+
+
+@contextlib.contextmanager
+def _refused(target: Path, then: str = "choose another place with --out") -> Iterator[None]:
     try:
-        _remove(draft)
-        yield draft
-        _remove(old)
-        if folder.exists():
-            os.replace(folder, old)
-        os.replace(draft, folder)
-        _remove(old)
+        yield
     except OSError as error:
-        raise OutputError(f"cannot write {folder}: {_reason(error)}; choose another place with --out.") from error
-    finally:
-        _remove(draft)
+        raise OutputError(f"cannot write {target}: {error.strerror or error}; {then}.") from error
 
 
 def _work(target: Path) -> Path:
@@ -261,10 +273,6 @@ def _move_aside(draft: Path, target: Path, why: str) -> None:
     raise OutputError(f"{why}, and stays as it is; the report is in {free}.")
 
 
-def _reason(error: OSError) -> str:
-    return error.strerror or str(error)
-
-
 def write_text(path: Path, text: str) -> Path:
     """Write text in one stroke, as UTF-8 with newlines as they are; see `write_bytes`."""
     return write_bytes(path, text.encode("utf-8"))
@@ -276,9 +284,6 @@ def write_bytes(path: Path, content: bytes) -> Path:
     Args:
         path: The file, replaced where it exists; its folder is made where it does not.
         content: What to write.
-
-    Returns:
-        The path.
 
     Raises:
         OutputError: it cannot be written; what was there before is still there.

@@ -1,6 +1,7 @@
 """Results on disk: one run at a time in a folder, nothing of anybody else's touched, no half of a folder."""
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -38,6 +39,25 @@ with files.new(Path(sys.argv[1]), own=lambda _: ()) as draft:
     (draft / "half").write_text("of a killed run")
     print("making", flush=True)
     sys.stdin.read()
+"""
+
+
+KILLED = """
+import os
+import signal
+import sys
+from pathlib import Path
+from fitmat import files
+
+def killed(source, target, replace=os.replace):
+    replace(source, target)
+    os.kill(os.getpid(), signal.SIGKILL)
+
+folder = Path(sys.argv[1])
+with files.alone(folder), files.replaced(folder / "group") as draft:
+    draft.mkdir()
+    (draft / "a.txt").write_text("new")
+    files.os.replace = killed
 """
 
 
@@ -152,6 +172,51 @@ def test_no_folder_is_ever_seen_in_part(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(files.os, "replace", watched)
     make(tmp_path / "out")
     assert seen == [[], sorted(NAMES)]
+
+
+def replace(folder: Path, content: str) -> None:
+    with files.replaced(folder) as draft:
+        draft.mkdir()
+        (draft / "a.txt").write_text(content)
+
+
+def test_what_a_killed_run_moved_aside_is_put_back(tmp_path: Path) -> None:
+    """Killed between the two renamings: whoever writes next finds the old folder in its place."""
+    group = tmp_path / "group"
+
+    def interrupted() -> None:
+        replace(group, "old")
+        assert subprocess.run([sys.executable, "-c", KILLED, str(tmp_path)]).returncode == -signal.SIGKILL
+        assert not group.exists()
+
+    interrupted()
+    with files.replaced(group) as draft:
+        assert inside(group) == {"a.txt": "old"}
+        draft.mkdir()
+    assert inside(group) == {}
+    interrupted()
+    with files.alone(tmp_path):
+        assert inside(group) == {"a.txt": "old"}
+    assert os.listdir(tmp_path) == ["group"]
+
+
+def test_what_was_moved_aside_is_put_back_where_nothing_comes_in_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    group = tmp_path / "group"
+    replace(group, "old")
+    renamed = os.replace
+
+    def refused(source: Path, target: Path) -> None:
+        if source.name == "draft":
+            raise OSError(28, "No space left on device")
+        renamed(source, target)
+
+    monkeypatch.setattr(files.os, "replace", refused)
+    with pytest.raises(OutputError, match=r"cannot write .*group: No space left on device; choose another place"):
+        replace(group, "new")
+    assert inside(group) == {"a.txt": "old"}
+    assert os.listdir(tmp_path) == ["group"]
 
 
 def test_a_file_in_the_way_is_refused_with_force_too(tmp_path: Path) -> None:
