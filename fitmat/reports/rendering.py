@@ -29,7 +29,7 @@ from fitmat.reports.snippets import snippets
 from fitmat.studies.cards import best, cards, ordered, title, wider
 from fitmat.studies.citations import bibtex
 from fitmat.text import visible_in
-from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAIL_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS
+from fitmat.uncertainty.diagnostics import ENOUGH_ESS, ENOUGH_TAIL_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS
 
 SCRIPTS = (
     "uplot/uPlot.iife.min.js",

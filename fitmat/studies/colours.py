@@ -62,7 +62,7 @@ class Colour:
         delta_e_95: ΔE2000 from the best fit within which 95 % of the draws are; NaN without draws.
         ellipse: Where 95 % of the draws are in a* and b* together; None without draws, and of a grey.
         draws: CIE L*a*b* of the draws, (m, 3).
-        verdict: How far the draws can be trusted, a key of `uncertainty.posterior.VERDICTS`.
+        verdict: How far the draws can be trusted, a key of `uncertainty.diagnostics.VERDICTS`.
     """
 
     name: str

@@ -50,7 +50,7 @@ class Fitted:
         channels: Names of its channels.
         parameters: As the report says them, those of instrument and noise and the discrepancy included.
         result: How the fit ended, a key of `fitting.concluding.RESULTS`.
-        verdict: How far the draws can be trusted, a key of `uncertainty.posterior.VERDICTS`.
+        verdict: How far the draws can be trusted, a key of `uncertainty.diagnostics.VERDICTS`.
         doubts: What speaks against the intervals, as sentences.
         file: Where the draws lie.
     """

@@ -20,9 +20,10 @@ from fitmat.errors import FitmatError, OutputError
 from fitmat.fitting.result import Fit
 from fitmat.uncertainty.checkpoint import Checkpoint, Saved, digest
 from fitmat.uncertainty.density import log_posterior, physical
+from fitmat.uncertainty.diagnostics import ENOUGH_ESS, ENOUGH_TAIL_ESS, ENOUGH_TAU, Diagnostics
 from fitmat.uncertainty.laplace import draws, independent_proposal, laplace
 from fitmat.uncertainty.mixing import split_rhat, tail_ess
-from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAIL_ESS, ENOUGH_TAU, Diagnostics, Posterior
+from fitmat.uncertainty.posterior import Posterior
 
 WALKERS = 40
 """Of the ensemble; four for each dimension where there are more than ten."""

@@ -22,8 +22,9 @@ from fitmat.maths.blas import one_thread
 from fitmat.measurements.samples import Measurements
 from fitmat.text import brief
 from fitmat.uncertainty.density import log_posterior, physical
+from fitmat.uncertainty.diagnostics import GOOD_PARETO
 from fitmat.uncertainty.pareto import smoothed
-from fitmat.uncertainty.posterior import GOOD_PARETO, Posterior
+from fitmat.uncertainty.posterior import Posterior
 from fitmat.uncertainty.scaled_weights import sampled, scaled_gaussian
 
 NAMED = 4

@@ -1,6 +1,6 @@
 """Mixing: whether walkers agree with each other, and how many independent draws stand behind the limits of intervals.
 
-Arrays of draws only; what is enough, `posterior` says.
+Arrays of draws only; what is enough, `diagnostics` says.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Draws of a fit's parameters, how the sampler went, and whether the draws may be trusted.
+"""Draws of a fit's parameters, and what is quoted of them.
 
 Draws nothing itself; `chains` and `laplace` do.
 """
@@ -25,64 +25,8 @@ from fitmat.fitting.result import Fit, by_curvature, quantities
 from fitmat.measurements.samples import Measurements
 from fitmat.models.parameters import Entry
 from fitmat.text import brief, html_table, text_table, with_error
+from fitmat.uncertainty.diagnostics import GOOD_PARETO, Diagnostics
 from fitmat.uncertainty.estimate import limits
-
-VERDICTS = {
-    "reliable": "The walks are long enough and agree with each other.",
-    "tentative": "The walks are short: the intervals may still move. Let them run longer.",
-    "unusable": "There is nothing to take intervals from: the walks do not agree, or nothing finite was found.",
-    "corrected": "Not sampled: draws around the best fit, weighted until they follow the posterior itself.",
-    "approximate": "Not sampled: a Gaussian around the best fit, which the posterior does not follow well. "
-    "Sample it before relying on the intervals.",
-    "not sampled": "Not sampled: a Gaussian around the best fit.",
-    "no posterior": "The loss is an objective, not a likelihood: there is a best fit and nothing around it.",
-}
-"""How far draws can be trusted, and what that means."""
-
-ENOUGH_TAU = 50
-"""A chain of this many autocorrelation times is long enough (emcee's documentation)."""
-
-ENOUGH_ESS = 400
-"""Independent draws per parameter that are enough for its mean (Vehtari et al. 2021)."""
-
-ENOUGH_TAIL_ESS = 714
-"""Independent draws behind each 95 % limit whose own standard error is then 0.1 sd, √(0.025 · 0.975/ESS)/φ(1.96)."""
-
-GOOD_RHAT = 1.05
-"""Split-R̂ over walkers up to which the posterior counts as converged."""
-
-
-GOOD_PARETO = 0.7
-"""Pareto k̂ of importance weights up to which their averages can be relied on (Vehtari et al. 2024, sec. 3)."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Diagnostics:
-    """How a chain went; arrays follow the sampled coordinates (free parameters, then s).
-
-    Attributes:
-        tau: Integrated autocorrelation time in steps.
-        ess: Effective number of independent draws.
-        tail_ess: The same behind the 95 % limits (`mixing.tail_ess`).
-        rhat: Split-R̂ over walkers.
-        acceptance: Accepted fraction of proposals.
-        steps: Steps per walker, burn-in included.
-        burn_in: Steps left out.
-        walkers: Number of walkers.
-        seed: What the run was started with.
-    """
-
-    tau: np.ndarray
-    ess: np.ndarray
-    tail_ess: np.ndarray
-    rhat: np.ndarray
-    acceptance: float
-    steps: int
-    burn_in: int
-    walkers: int
-    seed: int
-
-    __repr__ = brief
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -127,12 +71,7 @@ class Posterior:
             if self.pareto_k is None:
                 return "not sampled"
             return "approximate" if self.pareto_k > GOOD_PARETO else "corrected"
-        d = self.diagnostics
-        kept = d.steps - d.burn_in
-        if not np.isfinite(d.tau).all() or kept < 10 * d.tau.max() or d.rhat.max() > 1.2:
-            return "unusable"
-        enough = d.ess.min() >= ENOUGH_ESS and d.tail_ess.min() >= ENOUGH_TAIL_ESS and d.rhat.max() <= GOOD_RHAT
-        return "reliable" if enough and kept >= ENOUGH_TAU * d.tau.max() else "tentative"
+        return self.diagnostics.verdict
 
     @property
     def exact(self) -> bool:

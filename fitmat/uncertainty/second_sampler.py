@@ -24,9 +24,10 @@ from fitmat.maths.mapping import mapped
 from fitmat.models.base import AbstractBRDF
 from fitmat.text import brief, html_table, text_table
 from fitmat.uncertainty.density import log_density_at, physical
+from fitmat.uncertainty.diagnostics import ENOUGH_ESS, GOOD_RHAT
 from fitmat.uncertainty.laplace import draws
 from fitmat.uncertainty.mixing import split_rhat
-from fitmat.uncertainty.posterior import ENOUGH_ESS, GOOD_RHAT, Posterior
+from fitmat.uncertainty.posterior import Posterior
 from fitmat.uncertainty.scaled_weights import sampled
 
 AGREEING = 4.0

@@ -20,8 +20,9 @@ from fitmat.fitting.result import Fit
 from fitmat.models.parameters import vector, with_vector
 from fitmat.uncertainty.chains import CHUNK, WALKERS
 from fitmat.uncertainty.density import log_posterior
+from fitmat.uncertainty.diagnostics import ENOUGH_ESS, ENOUGH_TAIL_ESS, ENOUGH_TAU, GOOD_RHAT, Diagnostics
 from fitmat.uncertainty.mixing import split_rhat, tail_ess
-from fitmat.uncertainty.posterior import ENOUGH_ESS, ENOUGH_TAIL_ESS, ENOUGH_TAU, GOOD_RHAT, Diagnostics, Posterior
+from fitmat.uncertainty.posterior import Posterior
 
 QUANTILE = 0.15
 """In standard deviations: three Monte Carlo errors, 2.7/√ESS, of an outer quantile from about 1600 effective draws,

@@ -13,8 +13,9 @@ from fitmat.errors import FitmatError
 from fitmat.fitting import fitting
 from fitmat.fitting.result import Fit
 from fitmat.uncertainty.density import log_posterior
+from fitmat.uncertainty.diagnostics import GOOD_PARETO, VERDICTS
 from fitmat.uncertainty.laplace import LAPLACE_DRAWS, MOST_CORRECTED, PROPOSALS, heavy_tailed, laplace_each, smoothed
-from fitmat.uncertainty.posterior import GOOD_PARETO, VERDICTS, Posterior
+from fitmat.uncertainty.posterior import Posterior
 
 EFFECTIVE = 1000
 """2000 draws from 4000 proposals of which about half count are worth at least so many independent ones."""

@@ -11,8 +11,9 @@ from jaxtyping import Float
 from fitmat.fitting.likelihood import log_pointwise
 from fitmat.judgement.prediction import predictions
 from fitmat.text import brief
+from fitmat.uncertainty.diagnostics import GOOD_PARETO
 from fitmat.uncertainty.pareto import leave_one_out
-from fitmat.uncertainty.posterior import GOOD_PARETO, Posterior
+from fitmat.uncertainty.posterior import Posterior
 
 LEFT_OUT_DRAWS = 1000
 """Posterior draws behind the predictive densities."""
