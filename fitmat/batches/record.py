@@ -14,10 +14,8 @@ from typing import Any
 
 from fitmat import files
 from fitmat.errors import OutputError
+from fitmat.studies.result import BATCH
 from fitmat.text import visible
-
-RECORD = "batch.json"
-"""Name of the record."""
 
 PARTS = "parts"
 """Folder in a batch's folder of what is kept to go on, by key."""
@@ -68,7 +66,7 @@ class Claim:
             for name in set(self.before.parts) - set(parts):
                 _remove(self.folder / PARTS / name)
         after = dataclasses.asdict(Record(self.of, names, parts))
-        files.write_text(self.folder / RECORD, json.dumps(after))
+        files.write_text(self.folder / BATCH, json.dumps(after))
 
 
 def digest(told: Any) -> str:
@@ -103,13 +101,13 @@ def claimed(folder: Path, of: Mapping[str, str], names: Sequence[str], *, force:
 def _earlier(folder: Path) -> Record:
     """What a batch left; an empty record where none did."""
     try:
-        found = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        found = json.loads((folder / BATCH).read_text(encoding="utf-8"))
         names, parts = ([name for name in found[key] if Path(name).name == name] for key in ("files", "parts"))
         return Record(dict(found["of"]), names, parts)
     except FileNotFoundError:
         return Record({}, (), ())
     except (OSError, ValueError, LookupError, TypeError) as error:
-        why = f"{folder / RECORD} is no record of a batch, and is not replaced"
+        why = f"{folder / BATCH} is no record of a batch, and is not replaced"
         raise OutputError(f"{why}; move it, or give another --out DIR.") from error
 
 

@@ -33,6 +33,9 @@ FORMAT = 1
 RECORD, POSTERIOR, FIGURES = "fit.json", "posterior-{}.parquet", "figures.json"
 """Files of a run: the record, the draws of each model, and what a page draws."""
 
+BATCH = "batch.json"
+"""The record in the folder of a batch, which has no runs."""
+
 DRAWN = 1
 """Format of the figures; it grows when what older ones say would be misread."""
 
@@ -215,6 +218,10 @@ def _maskings(module: eqx.Module) -> Iterator[str]:
 
 def _read(file: Path) -> dict[str, Any]:
     """The record of a run in this version's format."""
+    if not file.exists() and (file.parent / BATCH).exists():
+        got = f"{file.parent} is the folder of a batch, which keeps one table (or arrays) of all, and no runs"
+        remedy = "Fit the file that you mean by itself, fitmat fit FILE --out DIR, and give that folder"
+        raise ReadError(f"{got}; expected the folder of a run. {remedy}.")
     try:
         found = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:

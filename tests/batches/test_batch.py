@@ -10,6 +10,7 @@ from typing import Any
 
 import polars as pl
 import pytest
+from typer.testing import CliRunner
 
 import fitmat as fm
 from fitmat import files
@@ -17,7 +18,8 @@ from fitmat.batches import workers
 from fitmat.batches.jobs import Job, digest, every_file, from_table
 from fitmat.batches.rows import CARDS, SWATCH
 from fitmat.batches.workers import studied
-from fitmat.errors import FitmatError, OutputError
+from fitmat.cli.application import app
+from fitmat.errors import FitmatError, OutputError, ReadError
 from fitmat.studies import record
 from fitmat.studies.cards import cards
 
@@ -138,6 +140,18 @@ def test_another_batch_takes_no_rows_away(scans: Path, tmp_path: Path, monkeypat
     (tmp_path / "own" / "index.html").write_text("mine")
     with pytest.raises(OutputError, match=r"index\.html is not known to be of an earlier batch"):
         fm.batch(one, tmp_path / "own", "lambert", force=True)
+
+
+@pytest.mark.parametrize("command", ["colour", "export", "render", "report", "plot", "cite", "compare"])
+def test_a_batch_in_the_place_of_a_run_is_told_apart(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(workers, "each", lambda jobs, count: ((key, [FITTED]) for key in jobs))
+    fm.batch(DATA / "wax.csv", tmp_path / "out", "lambert")
+    ran = CliRunner().invoke(app, [command, str(tmp_path / "out"), *(["other"] if command == "compare" else [])])
+    assert isinstance(ran.exception, ReadError)
+    assert "out is the folder of a batch, which keeps one table (or arrays) of all, and no runs" in str(ran.exception)
+    assert "fitmat fit FILE --out DIR" in str(ran.exception)
 
 
 @pytest.mark.parametrize("text", [None, "", "theta_i,theta_o,brdf\n10,20,0.1\n"])
