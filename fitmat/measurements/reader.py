@@ -6,7 +6,6 @@ It repairs nothing and drops nothing; what it cannot know it asks for.
 import dataclasses
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any, Protocol, cast, runtime_checkable
 
 import numpy as np
@@ -14,27 +13,12 @@ import polars as pl
 
 from fitmat import arguments
 from fitmat.errors import ReadError
-from fitmat.measurements import inferred, joining
+from fitmat.measurements import inferred, joining, recognition
 from fitmat.measurements.blocked import without_blocked
-from fitmat.measurements.formats import (
-    alta,
-    astm,
-    excel,
-    fred,
-    lighttools,
-    merl,
-    pab_opto,
-    parquet,
-    rgl,
-    road,
-    ssdd,
-    utia,
-    zemax,
-)
 from fitmat.measurements.horizon import along
 from fitmat.measurements.instrument import IDEAL, Instrument
 from fitmat.measurements.options import Options
-from fitmat.measurements.parsing import cells, contents, frames, tabular
+from fitmat.measurements.parsing import contents, frames, tabular
 from fitmat.measurements.parsing.recording import Recording, mask
 from fitmat.measurements.parsing.table import Table, from_arrays
 from fitmat.measurements.peak_side import with_peak_side
@@ -42,14 +26,6 @@ from fitmat.measurements.plausible_values import refuse_implausible, with_doubts
 from fitmat.measurements.quantity import factor, note
 from fitmat.measurements.samples import Measurements
 from fitmat.measurements.scale import of_unknown_scale
-from fitmat.measurements.writing import marks
-
-FORMATS: tuple[Any, ...] = (rgl, merl, zemax, lighttools, fred, astm, alta, ssdd, road, pab_opto, utia)
-"""Rooms of one format each, asked in this order: `claims(head, size)` says whether a file is theirs, `load(path)` makes
-the `Recording`; what none claims is a text table."""
-
-TABLES = (pab_opto,)
-"""Those that are text tables too: where the user says what the columns are, they are read as such."""
 
 EXCHANGED = "theta_i=phi_i,phi_i=theta_i,theta_o=phi_o,phi_o=theta_o"
 
@@ -94,8 +70,9 @@ def read(
 ) -> Measurements:
     """Read BRDF measurements from a file or several, a data frame, an xarray object or a dict of arrays.
 
-    Files of `FORMATS` are recognised by their content and say what they hold. Of text tables, Parquet files and the
-    rest the columns are recognised, in any letter case (`fitmat.measurements.parsing.names.ALIASES` has more names):
+    Files of `fitmat.measurements.formats` are recognised by their content and say what they hold. Of text tables,
+    Parquet files and the rest the columns are recognised, in any letter case
+    (`fitmat.measurements.parsing.names.ALIASES` has more names):
 
     - theta_i, theta_o, and phi = φ_o − φ_i or phi_i and phi_o, in degrees; the mirror side is φ = 180.
       Without azimuth, theta_o is signed: positive is forward, the mirror side.
@@ -231,41 +208,7 @@ def _recording(source: Source, columns: str | Mapping[str, str | int] | None, op
     if not isinstance(source, str | os.PathLike):
         return tabular.recording(_table(source), columns, options)
     with contents.on_disk(source) as path:
-        return _of_file(path, columns, options)
-
-
-def _of_file(
-    path: str | os.PathLike[str], columns: str | Mapping[str, str | int] | None, options: Options
-) -> Recording:
-    head, size = contents.contents(path, contents.HEAD), contents.size(path)
-    layout = next((layout for layout in FORMATS if layout.claims(head, size)), None)
-    if layout is None or (columns and layout in TABLES):
-        room = next((room for room in (parquet, excel) if room.claims(head, size)), cells)
-        return tabular.recording(room.load(path), columns, options)
-    _refuse_needless(contents.name(path), layout.__name__.rpartition(".")[2], columns, options)
-    return _with_marks(layout.load(path), Path(path))
-
-
-def _with_marks(recording: Recording, path: Path) -> Recording:
-    """The recording; where a file beside it tells what was inferred in it, with a warning that says so."""
-    beside = marks(path)
-    if beside is None or not beside.exists():
-        return recording
-    told = (
-        f"{contents.shown(beside.name)} beside this file says that some of its values were inferred, not measured. "
-        "Read that one, of which only what was measured is used."
-    )
-    return dataclasses.replace(recording, warnings=(*recording.warnings, told))
-
-
-def _refuse_needless(name: str, layout: str, columns: str | Mapping[str, str | int] | None, options: Options) -> None:
-    """Stop where the user says of a file what its format settles."""
-    usual = Options()
-    settled = ("quantity", "where", "angle_unit", "forward", "specular_azimuth", "scale")
-    said = [n for n in settled if getattr(options, n) != getattr(usual, n)]
-    for option in [*(["columns"] if columns else []), *said, *options.constants][:1]:
-        expected = f"expected no {option}= (--{option.replace('_', '-')}): the format settles it"
-        raise ReadError(f"{name}: a file of the format {layout}, {expected}. Leave it out.")
+        return recognition.recording(path, columns, options)
 
 
 def _table(source: Mapping[str, Any] | Frame) -> Table:

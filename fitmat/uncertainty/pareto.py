@@ -1,6 +1,6 @@
 """Pareto-smoothed importance sampling: weights whose largest follow the tail that fits them, and how heavy that is.
 
-It draws nothing, evaluates no density and decides nothing: what k̂ is good enough is `posterior`'s to say.
+It draws nothing, evaluates no density and decides nothing: what k̂ is good enough is for `diagnostics` to say.
 
 Vehtari, Simpson, Gelman, Yao & Gabry, "Pareto smoothed importance sampling", JMLR 25(72), 2024 (PSIS); Zhang &
 Stephens, "A new and efficient estimation method for the generalized Pareto distribution", Technometrics 51(3), 2009.

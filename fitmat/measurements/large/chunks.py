@@ -26,7 +26,8 @@ from fitmat.measurements.parsing.recording import Recording, named
 from fitmat.measurements.parsing.table import Table
 from fitmat.measurements.peak_side import with_peak_side
 from fitmat.measurements.plausible_values import refuse_implausible, with_doubts
-from fitmat.measurements.reader import FORMATS, measured
+from fitmat.measurements.reader import measured
+from fitmat.measurements.recognition import layout_of
 from fitmat.measurements.samples import Measurements
 from fitmat.measurements.scale import of_unknown_scale
 from fitmat.text import brief
@@ -86,7 +87,7 @@ def is_large(path: str | os.PathLike[str]) -> bool:
         ReadError: it cannot be opened.
     """
     size = contents.size(path)
-    return size >= LARGE and not any(layout.claims(contents.contents(path, contents.HEAD), size) for layout in FORMATS)
+    return size >= LARGE and layout_of(contents.contents(path, contents.HEAD), size) is None
 
 
 def scan(

@@ -27,7 +27,7 @@ import test_utia
 import test_zemax
 
 from fitmat.errors import ReadError
-from fitmat.measurements import reader
+from fitmat.measurements import recognition
 from fitmat.measurements.parsing import contents, footer, tensor
 from fitmat.measurements.reader import read
 from fitmat.measurements.samples import Measurements
@@ -53,7 +53,7 @@ def test_whatever_a_reader_is_given_becomes_measurements_or_one_sentence(name, c
 
 
 def test_every_format_is_fuzzed():
-    assert {layout.__name__.rpartition(".")[2] for layout in reader.FORMATS} <= set(fuzz.READERS)
+    assert {layout.__name__.rpartition(".")[2] for layout in recognition.FORMATS} <= set(fuzz.READERS)
 
 
 @pytest.mark.parametrize("name", [name for name, one in fuzz.READERS.items() if one.faults])
