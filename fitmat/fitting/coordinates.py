@@ -16,6 +16,7 @@ from jaxtyping import Array, Float
 
 from fitmat.errors import ModelError
 from fitmat.maths.arrays import library
+from fitmat.maths.normal import Z95
 from fitmat.models.around.shown import surface
 from fitmat.models.base import AbstractBRDF, AbstractEstimated
 from fitmat.models.estimated import unfitted
@@ -175,6 +176,22 @@ class Coordinates:
     def slope(self, values: Float[np.ndarray, "... p"]) -> Float[np.ndarray, "... k"]:
         """∂physical/∂natural: the value where the scale is log, else 1."""
         return np.where(self.ratio, values[..., self.index], 1.0)
+
+    def interval(self, values: Float[np.ndarray, " p"], sd: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k 2"]:
+        """95 % intervals, physical, of a normal in each natural coordinate; they end at the bounds.
+
+        Args:
+            values: The middle of all, physical.
+            sd: Standard deviations of the k parameters, physical.
+        """
+        middle = values[self.index]
+        with np.errstate(over="ignore"):
+            ratio = np.exp(Z95 * sd / self.slope(values))
+            low = np.where(self.ratio, middle / ratio, middle - Z95 * sd)
+            high = np.where(self.ratio, middle * ratio, middle + Z95 * sd)
+        ends = zip(self.around(self.natural(values)), (self.lower, self.upper), strict=True)
+        least, most = (np.where(self.ratio, bound, seen) for seen, bound in ends)
+        return np.stack([np.maximum(low, least), np.minimum(high, most)], axis=1)
 
     def scaled(self, natural: Numbers) -> Numbers:
         """Natural to scaled coordinates: weights times the scale g; what stands behind the k is kept."""

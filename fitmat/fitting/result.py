@@ -251,16 +251,9 @@ def by_curvature(fit: Fit) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, "
 
     Both are NaN where the loss is an objective.
     """
-    every, v = coordinates(fit.model), fit.values
     few = unknown_spread(fit.noise.known, fit.n_values, len(fit.free))
-    sd = np.sqrt(few * np.diagonal(fit.covariance)) if fit.loss.posterior else np.full(len(v), np.nan)
-    with np.errstate(over="ignore"):
-        ratio = np.exp(Z95 * sd / every.slope(v))
-        low = np.where(every.ratio, v / ratio, v - Z95 * sd)
-        high = np.where(every.ratio, v * ratio, v + Z95 * sd)
-    ends = zip(every.around(every.natural(v)), (every.lower, every.upper), strict=True)
-    least, most = (np.where(every.ratio, bound, seen) for seen, bound in ends)
-    return sd, np.stack([np.maximum(low, least), np.minimum(high, most)], axis=1)
+    sd = np.sqrt(few * np.diagonal(fit.covariance)) if fit.loss.posterior else np.full(len(fit.values), np.nan)
+    return sd, coordinates(fit.model).interval(fit.values, sd)
 
 
 def quantities(
