@@ -20,6 +20,7 @@ from fitmat._types import Progress
 from fitmat.batches import record
 from fitmat.batches.atlas import UNREADABLE, ZARR, Atlas, read_atlas, unpacked
 from fitmat.batches.maps import MAPS, maps
+from fitmat.batches.photographs import TABLE, read_photographs
 from fitmat.batches.record import PARTS
 from fitmat.extras import needed
 from fitmat.fitting.losses import DEFAULT, loss
@@ -75,7 +76,7 @@ def fit_texture(
     """Fit a model to every point of an atlas.
 
     Args:
-        source: The atlas, as `read_atlas` takes it.
+        source: The atlas, as `read_atlas` takes it, or the table of lights of pictures, as `read_photographs` does.
         folder: For `texture.npz` or `texture.zarr`, and what is kept to go on after an interruption.
         model: Name of the model.
         force: Replace the results of something else in the folder.
@@ -92,11 +93,12 @@ def fit_texture(
     arguments.kind("source", source, str, os.PathLike)
     arguments.kind("folder", folder, str, os.PathLike)
     arguments.kind("model", model, str)
-    atlas, target, say = read_atlas(Path(source)), Path(folder), progress or (lambda *_: None)
+    suffix, target, say = Path(source).suffix.lower(), Path(folder), progress or (lambda *_: None)
+    atlas = read_photographs(Path(source)) if suffix == TABLE else read_atlas(Path(source))
     given = told.get("fixed") or {}, loss(told.get("loss", DEFAULT.name)), told.get("masking")
     shared, held = shared_by_all([atlas.wi, atlas.wo], len(atlas.channels), model, *given)
     axes, count = atlas.points, int(np.prod(atlas.points))
-    name = f"{RESULT}{Path(source).suffix.lower()}"
+    name = f"{RESULT}{ZARR if suffix == ZARR else '.npz'}"
     with files.alone(target):
         keys = [_key(atlas, *atlas.tile(part), model, told) for part in slices(count, TILE)]
         of = {name: record.digest([axes, atlas.channels, keys])}

@@ -17,6 +17,7 @@ from rich.text import Text
 
 from fitmat.batches.atlas import SUFFIXES
 from fitmat.batches.batch import PAGE, Batch, batch
+from fitmat.batches.photographs import TABLE
 from fitmat.batches.textures import fit_texture
 from fitmat.cli import interrupts, process, session
 from fitmat.cli.flags.fitting import MODELS
@@ -79,6 +80,21 @@ def is_texture(sources: Sequence[Path]) -> bool:
     return len(sources) == 1 and sources[0].suffix.lower() in SUFFIXES
 
 
+def alone(lights: Path | None, sources: Sequence[Path]) -> Path:
+    """The table of lights, or the one texture.
+
+    Raises:
+        FitmatError: there are files beside the table, or it is no CSV.
+    """
+    if lights is None:
+        return sources[0]
+    if sources:
+        raise FitmatError(f"{sources[0]} beside --lights {lights}, expected one of them: the table names its pictures.")
+    if lights.suffix.lower() != TABLE:
+        raise FitmatError(f"--lights {lights}: expected a table of lights whose name ends in {TABLE}.")
+    return lights
+
+
 def texture(
     source: Path,
     folder: Path,
@@ -90,7 +106,7 @@ def texture(
     """Fit every point of a texture, and print how the fits ended; Ctrl-C ends it, and what was done is kept.
 
     Args:
-        source: The atlas.
+        source: The atlas, or a table of lights.
         folder: Where to.
         idle: Other flags, all of no use here, which are refused.
         reading: Arguments of `fitmat.read`.

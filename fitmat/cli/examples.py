@@ -54,7 +54,8 @@ BATCH = (
     "Examples:\n\n  fitmat batch scans --out results\n\n"
     "  fitmat batch atlas.npz --models lambert+ggx --loss gaussian\n\n"
     "  fitmat batch 'scans/*.csv' --models lambert+ggx --fix ks=1\n\n"
-    "  fitmat batch --jobs jobs.csv"
+    "  fitmat batch --jobs jobs.csv\n\n"
+    "  fitmat batch --lights photos/lights.csv"
 )
 
 LABS = (

@@ -14,6 +14,7 @@ from fitmat.cli.flags.batch import (
     BatchOutFlag,
     DeviceFlag,
     JobsFlag,
+    LightsFlag,
     McmcFlag,
     PoolFlag,
     ProcessesFlag,
@@ -78,6 +79,7 @@ def batch(
     files: SourcesFlag = None,
     out: BatchOutFlag = Path("fitmat-batch"),
     jobs: JobsFlag = None,
+    lights: LightsFlag = None,
     models: ModelsFlag = MODELS,
     processes: ProcessesFlag = None,
     scheduler: SchedulerFlag = None,
@@ -102,12 +104,12 @@ def batch(
     told = {"models": models, "loss": loss, "masking": masking, "ior": ior, "tilt": tilt, "seed": seed}
     told |= {"dispersion": dispersion, "film": film, "sampling": mcmc} | fit.known(fix or [], prior or [])
     read = reading | {"instrument": instrument}
-    if batch.is_texture(files or []):
+    if lights is not None or batch.is_texture(files or []):
         idle, doing = (
             {"jobs": jobs, "scheduler": scheduler, "pool": pool},
             {"threads": processes, "device": device, "force": force},
         )
-        return batch.texture((files or [])[0], out, idle, read, told, doing)
+        return batch.texture(batch.alone(lights, files or []), out, idle, read, told, doing)
     doing = {"processes": processes, "scheduler": scheduler, "device": device, "pool": pool, "force": force}
     found = batch.run(files or [], out, jobs, read, told, doing)
     batch.show(found)

@@ -31,6 +31,16 @@ JobsFlag = Annotated[
     ),
 ]
 
+LightsFlag = Annotated[
+    Path | None,
+    typer.Option(
+        help="Pictures of a flat sample under one light each, as a texture: CSV with columns picture (OpenEXR), "
+        "theta_i, phi_i (degrees) and irradiance, in radiances × sr; theta_o and phi_o where the camera is not above.",
+        metavar="FILE",
+        show_default=False,
+    ),
+]
+
 ProcessesFlag = Annotated[
     int | None,
     typer.Option(min=1, help="How many files at once; default one for each core.", metavar="N", show_default=False),

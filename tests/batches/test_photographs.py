@@ -1,0 +1,150 @@
+"""Photographs: pictures under one light each are fitted as what made them, and wrong tables are one sentence."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+import pytest
+from typer.testing import CliRunner
+
+from fitmat.batches.photographs import read_photographs
+from fitmat.batches.textures import fit_texture
+from fitmat.cli.application import app
+from fitmat.errors import FitmatError
+
+ROWS, COLUMNS = 3, 4
+
+ALPHA = np.linspace(0.2, 0.5, ROWS * COLUMNS).reshape(ROWS, COLUMNS)
+
+LIGHTS = [(theta, phi, 2.0 + 0.1 * k) for k, theta in enumerate(range(0, 84, 6)) for phi in (0, 90)]
+"""θ_i, φ_i in degrees, and irradiance."""
+
+CAMERA = 25.0
+"""Its zenith angle, at azimuth 180°."""
+
+
+def draw(path: Path, layers: dict[str, np.ndarray]) -> None:
+    OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, layers).write(str(path))
+
+
+def radiances(theta: float, phi: float, irradiance: float) -> np.ndarray:
+    """L = f E cosθ_i of a Lambertian floor under Walter's GGX of η = 1.5, written out, (rows, columns, 3)."""
+    wi, wo = (
+        np.array([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)])
+        for t, p in np.deg2rad([(theta, phi), (CAMERA, 180.0)])
+    )
+    h = (wi + wo) / np.linalg.norm(wi + wo)
+    d, c, a2 = h[2], wi @ h, ALPHA**2
+    distribution = a2 / (np.pi * (d * d * (a2 - 1.0) + 1.0) ** 2)
+    shadowed = [(np.sqrt(1.0 + a2 * (1.0 / w[2] ** 2 - 1.0)) - 1.0) / 2.0 for w in (wi, wo)]
+    g = np.sqrt(1.5**2 - 1.0 + c * c)
+    fresnel = 0.5 * ((g - c) / (g + c)) ** 2 * (1.0 + ((c * (g + c) - 1.0) / (c * (g - c) + 1.0)) ** 2)
+    specular = distribution * fresnel / (1.0 + sum(shadowed)) / (4.0 * wi[2] * wo[2])
+    found = np.array([0.1, 0.3, 0.6]) / np.pi + specular[..., None]
+    return found * irradiance * wi[2]
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    lines = ["picture,theta_i,phi_i,irradiance,theta_o,phi_o"]
+    for k, light in enumerate(LIGHTS):
+        draw(tmp_path / f"{k:02}.exr", {"RGB": radiances(*light).astype(np.float32)})
+        lines.append(f"{k:02}.exr,{light[0]},{light[1]},{light[2]:g},{CAMERA:g},180")
+    path = tmp_path / "lights.csv"
+    path.write_text("\n".join(lines))
+    return path
+
+
+def test_pictures_are_the_values_that_made_them(table: Path, tmp_path: Path) -> None:
+    """Every point's roughness and colours come back, against a GGX that is written out here."""
+    found = fit_texture(table, tmp_path / "out", fixed={"ks": 1.0})
+    assert found.file.name == "texture.npz"
+    np.testing.assert_allclose(found.fits["alpha"], ALPHA, rtol=1e-4)
+    np.testing.assert_allclose(found.fits["eta"], np.full((ROWS, COLUMNS), 1.5), rtol=1e-3)
+    np.testing.assert_allclose(found.fits["kd"], np.broadcast_to([0.1, 0.3, 0.6], (ROWS, COLUMNS, 3)), rtol=1e-3)
+    assert len(found.maps) > 0
+
+
+def test_a_grey_picture_and_what_is_not_finite(tmp_path: Path) -> None:
+    """f = L/(E cosθ_i); a pixel that is not finite is masked; rows are read where they are asked for."""
+    grey = np.arange(12.0).reshape(ROWS, COLUMNS).astype(np.float16)
+    grey[0, 0], grey[2, 3] = np.inf, np.nan
+    draw(tmp_path / "a.exr", {"Y": grey})
+    (tmp_path / "lights.csv").write_text("picture,theta_i,phi_i,irradiance\na.exr,60,0,4\n")
+    atlas = read_photographs(tmp_path / "lights.csv")
+    assert atlas.points == (ROWS, COLUMNS)
+    value, _ = atlas.tile(slice(0, ROWS * COLUMNS))
+    expected = np.where(np.isfinite(grey), grey, np.nan).astype(float).ravel() / 2.0
+    np.testing.assert_allclose(value[:, 0, 0], expected, rtol=1e-12)
+    part, _ = atlas.tile(slice(5, 7))
+    np.testing.assert_array_equal(part, value[5:7])
+    np.testing.assert_array_equal(atlas.wo, [[0.0, 0.0, 1.0]])
+
+
+GOOD = "picture,theta_i,phi_i,irradiance\n00.exr,10,0,2\n01.exr,20,0,2\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("", "no table of lights can be read"),
+        ("picture,theta_i,phi_i,irradiance\n", "no row, expected picture, theta_i, phi_i, irradiance"),
+        ("picture,theta_i\n00.exr,10\n", "columns picture, theta_i, expected picture"),
+        (GOOD.replace("phi_i", "azimuth"), "a column 'azimuth', expected picture"),
+        (GOOD.replace("20", "much"), "row 2: theta_i is 'much', expected a number"),
+        (GOOD.replace("20,0,2", "20,0,"), "row 2: irradiance is nothing, expected a number"),
+        (GOOD.replace("20,0,2", "20,0,0"), "row 2: irradiance is 0, expected above 0"),
+        (GOOD.replace("20", "90"), "row 2: theta_i is 90, expected 0 to below 90 degrees"),
+        (GOOD.replace("10", "0.2").replace("20", "0.9"), "they look like radians. Convert them."),
+        (GOOD.replace("01.exr", "01.png"), "01.png: expected an OpenEXR picture"),
+        (GOOD.replace("01.exr", "no.exr"), "no.exr: no picture can be read"),
+        (GOOD.replace("01.exr", "broken.exr"), "broken.exr: no picture can be read"),
+        (GOOD.replace("01.exr", "wide.exr"), "wide.exr: 5 × 3 pixels of R, G, B, expected 4 × 3 pixels of R, G, B"),
+        (GOOD.replace("01.exr", "depth.exr"), "depth.exr: channels Z, expected R, G and B, or Y"),
+        (GOOD.replace("01.exr", ""), "a row without a picture, expected the name"),
+    ],
+)
+def test_wrong_tables_are_one_sentence(content: str, message: str, table: Path, tmp_path: Path) -> None:
+    draw(tmp_path / "wide.exr", {"RGB": np.ones((3, 5, 3), np.float32)})
+    draw(tmp_path / "depth.exr", {"Z": np.ones((3, 4), np.float32)})
+    (tmp_path / "broken.exr").write_bytes((tmp_path / "00.exr").read_bytes()[:60])
+    table.write_text(content)
+    with pytest.raises(FitmatError) as caught:
+        read_photographs(table)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["{folder}/x.csv", "--lights", "{folder}/lights.csv"], "expected one of them: the table names its pictures"),
+        (["--lights", "{folder}/lights.txt"], "whose name ends in .csv"),
+        (["--lights", "{folder}/lights.csv", "--jobs", "{folder}/x.csv"], "for which jobs means nothing"),
+    ],
+)
+def test_what_means_nothing_beside_lights_is_refused(words: list[str], message: str, table: Path) -> None:
+    told = [word.format(folder=table.parent) for word in words]
+    ran = CliRunner().invoke(app, ["batch", *told, "--out", str(table.parent / "out")])
+    assert ran.exit_code == 1
+    assert message in str(ran.exception) + ran.output
+
+
+def test_the_command_fits_pictures(table: Path, tmp_path: Path) -> None:
+    told = ["--lights", table, "--out", tmp_path / "out", "--fix", "ks=1"]
+    ran = CliRunner().invoke(app, ["batch", *map(str, told)])
+    assert ran.exit_code == 0, ran.output
+    assert "12 fits of lambert+ggx: 12 converged." in ran.output
+    with np.load(tmp_path / "out" / "texture.npz", allow_pickle=False) as kept:
+        np.testing.assert_allclose(kept["alpha"], ALPHA, rtol=1e-4)
+
+
+def test_an_atlas_of_pictures_equals_that_of_arrays(table: Path, tmp_path: Path) -> None:
+    """The same values in a .npz file give the same fits, bit for bit."""
+    atlas = read_photographs(table)
+    value, _ = atlas.tile(slice(0, ROWS * COLUMNS))
+    np.savez(tmp_path / "atlas.npz", value=value.reshape(atlas.value.shape), wi=atlas.wi, wo=atlas.wo)
+    told: dict[str, Any] = {"fixed": {"ks": 1.0}}
+    one, other = (fit_texture(path, tmp_path / path.stem, **told) for path in (table, tmp_path / "atlas.npz"))
+    np.testing.assert_array_equal(one.fits.values, other.fits.values)
