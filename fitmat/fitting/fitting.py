@@ -28,7 +28,7 @@ from fitmat.fitting.result import Fit
 from fitmat.fitting.seeing import seen
 from fitmat.fitting.starts import starting_points
 from fitmat.maths.blas import one_thread
-from fitmat.measurements.noise import measured_noise
+from fitmat.measurements.noise import Noise, measured_noise
 from fitmat.measurements.reader import measurements_of
 from fitmat.measurements.samples import Measurements
 from fitmat.models import names
@@ -75,11 +75,29 @@ def fit(
     Example:
         >>> fit(read("measurements.csv"), "lambert+ggx", fixed={"ks": 1.0})  # doctest: +SKIP
     """
-    refuse_single_precision()
     arguments.kind("to", to, str, AbstractBRDF)
     arguments.named(fixed=fixed, priors=priors)
     arguments.whole("max_steps", max_steps, 1)
-    measurements = measurements_of(measurements)
+    given = measurements_of(measurements)
+    asked = {"fixed": fixed, "priors": priors, "loss": loss, "masking": masking, "dispersion": dispersion}
+    return fitted(given, measured_noise(given), to, **asked, max_steps=max_steps)
+
+
+@one_thread()
+def fitted(
+    measurements: Measurements,
+    noise: Noise,
+    to: str | AbstractBRDF,
+    *,
+    fixed: Mapping[str, ArrayLike] | None = None,
+    priors: Mapping[str, tuple[ArrayLike, ArrayLike]] | None = None,
+    loss: str = DEFAULT.name,
+    masking: str | None = None,
+    dispersion: str | None = None,
+    max_steps: int = MAX_STEPS,
+) -> Fit:
+    """`fit` where the noise, which is the same for every model, was looked for before."""
+    refuse_single_precision()
     template = located(asked_model(to, len(measurements.channels), masking), measurements.channels)
     arguments.kind("dispersion", dispersion, str, optional=True)
     if dispersion is not None:
@@ -94,13 +112,12 @@ def fit(
     held = held_values(shown, fixed)
     moved = coordinates(shown, held)
     needed = moved.count + 2
-    found_noise = measured_noise(measurements)
-    if chosen.needs_noise and not found_noise.known:
+    if chosen.needs_noise and not noise.known:
         raise FitmatError(
             f"{measurements.source}: the loss {chosen.name} needs the noise, and it is not known; give a column sigma, "
             f"or choose another loss (default infers what is needed)."
         )
-    data = prepare(measurements, found_noise, prepare_prior(shown, measurements.instrument, known), chosen)
+    data = prepare(measurements, noise, prepare_prior(shown, measurements.instrument, known), chosen)
     usable = int(np.count_nonzero(data.weight))
     if usable < needed:
         raise FitmatError(
@@ -114,9 +131,9 @@ def fit(
     ends = confirmed(shown, data, starts, moved, max_steps)
     if measurements.sigma is not None and not chosen.infers_noise:  # noise that readings show has jitter in it
         data, ends = _with_jitter(measurements, shown, data, ends, moved, max_steps)
-    if not found_noise.known and chosen.infers_discrepancy:
-        found_noise, data, ends = proportional(measurements, shown, (found_noise, data), ends, moved, max_steps)
-    return conclude(measurements, shown, held, (found_noise, data), ends)
+    if not noise.known and chosen.infers_discrepancy:
+        noise, data, ends = proportional(measurements, shown, (noise, data), ends, moved, max_steps)
+    return conclude(measurements, shown, held, (noise, data), ends)
 
 
 def refuse_single_precision() -> None:

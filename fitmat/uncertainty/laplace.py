@@ -19,6 +19,7 @@ from fitmat.fitting.coordinates import Coordinates
 from fitmat.fitting.information import inverse_information, unknown_spread
 from fitmat.fitting.result import Fit
 from fitmat.maths.blas import one_thread
+from fitmat.measurements.noise import measured_noise
 from fitmat.measurements.samples import Measurements
 from fitmat.text import brief
 from fitmat.uncertainty.density import log_posterior, physical
@@ -100,14 +101,15 @@ def laplace_each(
     Raises:
         FitmatError: as `fit`, for a model that cannot be fitted.
     """
-
-    def one(name: str) -> Posterior:
-        return laplace(fitting.fit(measurements, name, **jobs[name]), seed=seed, corrected=corrected)
-
     many = len(jobs) > NAMED
     words = f"fitting {f'{len(jobs)} models' if many else ', '.join(jobs)}"
     say, total = progress or (lambda *_: None), len(jobs) if many else 0
     say(words, 0, total)
+    noise = measured_noise(measurements)
+
+    def one(name: str) -> Posterior:
+        return laplace(fitting.fitted(measurements, noise, name, **jobs[name]), seed=seed, corrected=corrected)
+
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         pending = {pool.submit(one, name): name for name in reversed(list(jobs))}  # what takes longest stands last
         for done, job in enumerate(as_completed(pending), 1):

@@ -12,6 +12,8 @@ import fitmat as fm
 from fitmat.errors import FitmatError
 from fitmat.fitting import fitting
 from fitmat.fitting.result import Fit
+from fitmat.measurements.noise import Noise, measured_noise
+from fitmat.uncertainty import laplace as room
 from fitmat.uncertainty.density import log_posterior
 from fitmat.uncertainty.diagnostics import GOOD_PARETO, VERDICTS
 from fitmat.uncertainty.laplace import LAPLACE_DRAWS, MOST_CORRECTED, PROPOSALS, heavy_tailed, laplace_each, smoothed
@@ -186,14 +188,24 @@ def test_reported_intervals_come_from_corrected_draws(near_bound: Fit) -> None:
     np.testing.assert_allclose(doubtful.quantities()[0].ci95, plain.quantities()[0].ci95)
 
 
+def test_the_noise_of_a_file_is_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is the same for every model."""
+    monkeypatch.setattr(fitting, "fitted", lambda measurements, noise, name: noise)
+    monkeypatch.setattr(room, "laplace", lambda fit, **_: fit)
+    m = dataclasses.replace(lambert(0.5, 0.02), sigma=None)
+    found: list[Any] = laplace_each(m, {"phong": {}, "ggx": {}}, seed=0)
+    assert found[0] is found[1]
+    np.testing.assert_array_equal(found[0].sigma, measured_noise(m).sigma)
+
+
 @pytest.mark.parametrize("slow", ["phong", "ggx"])
 def test_of_several_refusals_the_same_one_is_named(monkeypatch: pytest.MonkeyPatch, slow: str) -> None:
     """Whichever thread ends first."""
 
-    def refused(measurements: fm.Measurements, name: str) -> None:
+    def refused(measurements: fm.Measurements, noise: Noise, name: str) -> None:
         time.sleep(0.2 * (name == slow))
         raise FitmatError(name)
 
-    monkeypatch.setattr(fitting, "fit", refused)
+    monkeypatch.setattr(fitting, "fitted", refused)
     with pytest.raises(FitmatError, match=r"^ggx$"):
         laplace_each(lambert(0.5, 0.02), {"phong": {}, "ggx": {}}, seed=0)
