@@ -1,4 +1,4 @@
-"""Maps: a texture's parameters as pictures, and a glTF material that binds them, for viewers and engines.
+"""Maps: a texture's parameters as pictures, and a glTF and a MaterialX material that bind them.
 
 Numbers are renamed, none is imitated: a point's material is glTF's with the same albedo, slope and F0.
 """
@@ -11,12 +11,13 @@ from jaxtyping import Bool, Float
 from fitmat.colour.spaces import encoded
 from fitmat.exports import gltf
 from fitmat.fitting.many.fits import Fits
-from fitmat.models.terms.fresnel import f0_from_eta
+from fitmat.models.terms.fresnel import eta_from_f0, f0_from_eta
 
-BASE, ROUGH, SPECULAR, SCENE = "base_color.png", "metallic_roughness.png", "specular_color.png", "texture.gltf"
+BASE, ROUGH, SPECULAR = "base_color.png", "metallic_roughness.png", "specular_color.png"
+SCENE, NODES = "texture.gltf", "texture.mtlx"
 """Names of the files."""
 
-MAPS = (BASE, ROUGH, SPECULAR, SCENE)
+MAPS = (BASE, ROUGH, SPECULAR, SCENE, NODES)
 """All of them."""
 
 LEVELS = 255.0
@@ -49,6 +50,7 @@ def maps(fits: Fits) -> dict[str, bytes]:
         ROUGH: _png(packed),
         SPECULAR: _png(encoded(np.clip(f0 / most, 0.0, 1.0))),
         SCENE: _scene(most).encode("ascii"),
+        NODES: _nodes(most).encode("ascii"),
     }
 
 
@@ -74,7 +76,6 @@ def _png(values: Float[np.ndarray, "rows columns 3"]) -> bytes:
 
 def _scene(most: float) -> str:
     """A square with the material; the texture's first row is at its upper edge."""
-    root = most**0.5
     material = {
         "name": "texture",
         "pbrMetallicRoughness": {
@@ -83,7 +84,7 @@ def _scene(most: float) -> str:
             "metallicFactor": 0.0,
         },
         "extensions": {
-            "KHR_materials_ior": {"ior": (1.0 + root) / (1.0 - root)},
+            "KHR_materials_ior": {"ior": _index(most)},
             "KHR_materials_specular": {"specularColorTexture": {"index": 2}},
         },
     }
@@ -94,3 +95,42 @@ def _scene(most: float) -> str:
     }
     faces = np.array([[0, 1, 2], [2, 1, 3]])
     return gltf.document("texture", ABOUT, material, corners, faces, (BASE, ROUGH, SPECULAR))
+
+
+def _nodes(most: float) -> str:
+    """The same material by MaterialX's node of it; a picture's first row is at v = 1 there."""
+    return f"""<?xml version="1.0"?>
+<!--
+{ABOUT[0]}
+-->
+<materialx version="1.39" colorspace="lin_rec709">
+  <image name="base" type="color3">
+    <input name="file" type="filename" value="{BASE}" colorspace="srgb_texture" />
+  </image>
+  <image name="packed" type="color3">
+    <input name="file" type="filename" value="{ROUGH}" />
+  </image>
+  <extract name="rough" type="float">
+    <input name="in" type="color3" nodename="packed" />
+    <input name="index" type="integer" value="1" />
+  </extract>
+  <image name="specular" type="color3">
+    <input name="file" type="filename" value="{SPECULAR}" colorspace="srgb_texture" />
+  </image>
+  <gltf_pbr name="surface" type="surfaceshader">
+    <input name="base_color" type="color3" nodename="base" />
+    <input name="metallic" type="float" value="0" />
+    <input name="roughness" type="float" nodename="rough" />
+    <input name="specular_color" type="color3" nodename="specular" />
+    <input name="ior" type="float" value="{_index(most)!r}" />
+  </gltf_pbr>
+  <surfacematerial name="material" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="surface" />
+  </surfacematerial>
+</materialx>
+"""
+
+
+def _index(f0: float) -> float:
+    """The index of refraction that reflects so much at normal incidence."""
+    return float(eta_from_f0(np.array(f0)))

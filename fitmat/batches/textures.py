@@ -47,7 +47,7 @@ class Texture:
     Attributes:
         file: The arrays on disk: each parameter by its name, `NAME_sd`, `outcome` with the `outcomes` that its numbers
             mean, `discrepancy`, `n_values`, and the names of the `channels`.
-        maps: Pictures of the parameters and a glTF material that binds them; see `maps`.
+        maps: Pictures of the parameters, and a glTF and a MaterialX material that bind them; see `maps`.
         fits: The arrays.
         earlier: Points that an earlier run had fitted.
     """

@@ -50,7 +50,7 @@ BATCH = (
     "One .npz file or Zarr group (.zarr) with an array value (rows, columns, samples, channels) or (points, samples, "
     "channels) is a texture: its directions are wi and wo, or theta_i, theta_o, phi_i, phi_o in degrees, the same at "
     "every point; sigma if it is known. texture.npz, or texture.zarr, has every parameter with its standard deviation, "
-    "and the outcome, at every point; beside it are maps, and a glTF material that binds them.\n\n"
+    "and the outcome, at every point; beside it are maps, and a glTF and a MaterialX material of them.\n\n"
     "Examples:\n\n  fitmat batch scans --out results\n\n"
     "  fitmat batch atlas.npz --models lambert+ggx --loss gaussian\n\n"
     "  fitmat batch 'scans/*.csv' --models lambert+ggx --fix ks=1\n\n"

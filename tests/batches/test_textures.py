@@ -10,9 +10,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import MaterialX as mx
 import numpy as np
 import pytest
 import zarr
+from MaterialX import PyMaterialXGenGlsl as mx_glsl
+from MaterialX import PyMaterialXGenShader as mx_gen
 from PIL import Image
 from typer.testing import CliRunner
 
@@ -187,7 +190,7 @@ def test_maps_hold_the_parameters(atlas: Path, tmp_path: Path) -> None:
     """Of glTF 2.0, sections 3.9.2 and 5.22.2, and IEC 61966-2-1: sRGB colours, roughness √α in green."""
     found = fit_texture(atlas, tmp_path / "out", **TOLD)
     assert [path.name for path in found.maps] == [
-        *("base_color.png", "metallic_roughness.png", "specular_color.png", "texture.gltf")
+        *("base_color.png", "metallic_roughness.png", "specular_color.png", "texture.gltf", "texture.mtlx")
     ]
     pictures = [np.asarray(Image.open(path), float) / 255.0 for path in found.maps[:3]]
     base, rough, specular = pictures
@@ -212,12 +215,48 @@ def test_points_in_no_rows_have_no_maps(tmp_path: Path) -> None:
     assert (found.maps, found.fits.outcome.shape) == ((), (2,))
 
 
+def test_materialx_takes_the_document(atlas: Path, tmp_path: Path) -> None:
+    """Its own library finds it valid and writes a shader of it, with the glTF file's pictures and number."""
+    found = fit_texture(atlas, tmp_path / "out", **TOLD)
+    document, search = mx.createDocument(), mx.getDefaultDataSearchPath()
+    mx.readFromXmlFile(document, str(found.maps[4]))
+    library = mx.createDocument()
+    mx.loadLibraries(mx.getDefaultDataLibraryFolders(), search, library)
+    document.importLibrary(library)
+    valid, why = document.validate()
+    assert valid, why
+    generator = mx_glsl.EsslShaderGenerator.create()
+    colours = mx_gen.DefaultColorManagementSystem.create(generator.getTarget())
+    colours.loadLibrary(document)
+    generator.setColorManagementSystem(colours)
+    context: Any = mx_gen.GenContext(generator)
+    context.registerSourceCodeSearchPath(search)
+    environments = mx_gen.HwSpecularEnvironmentMethod
+    context.getOptions().hwSpecularEnvironmentMethod = environments.SPECULAR_ENVIRONMENT_FIS
+    element = mx_gen.findRenderableElements(document)[0]
+    shader = generator.generate("material", element, context).getSourceCode(mx_gen.PIXEL_STAGE)
+    main = shader[shader.index("void main") :]
+    assert [name for name in PICTURES if f"mx_image_color3({name}_file" in main] == list(PICTURES)
+    assert [name for name in PICTURES if f"NG_srgb_texture_to_lin_rec709_color3({name}_out" in main] == [
+        *("base", "specular")
+    ]
+    assert "rough_out = packed_out[" in main
+    files = {node.getName(): node.getInputValue("file") for node in document.getNodes("image")}
+    assert [files[name] for name in PICTURES] == [path.name for path in found.maps[:3]]
+    index = json.loads(found.maps[3].read_text())["materials"][0]["extensions"]["KHR_materials_ior"]["ior"]
+    assert document.getNode("surface").getInputValue("ior") == pytest.approx(index, rel=1e-6)
+
+
+PICTURES = ("base", "packed", "specular")
+"""Names of the nodes of pictures."""
+
+
 @pytest.mark.study
 def test_khronos_finds_no_fault_in_a_texture(atlas: Path, tmp_path: Path) -> None:
     node = shutil.which("node")
     if node is None or subprocess.run([node, "-e", "require('gltf-validator')"], capture_output=True).returncode:
         pytest.skip("no gltf-validator: npm install gltf-validator, and name its node_modules in NODE_PATH")
-    file = fit_texture(atlas, tmp_path / "out", **TOLD).maps[-1]
+    file = fit_texture(atlas, tmp_path / "out", **TOLD).maps[3]
     ended = subprocess.run([node, "-e", VALIDATE, str(file)], capture_output=True, check=True)
     issues = json.loads(ended.stdout)
     assert (issues["numErrors"], issues["numWarnings"]) == (0, 0), issues
