@@ -1,5 +1,6 @@
 """Textures: an atlas is fitted as its arrays are, tiles are kept and used again, and wrong files are one sentence."""
 
+import importlib
 import json
 import os
 import shutil
@@ -10,12 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import MaterialX as mx
 import numpy as np
 import pytest
 import zarr
-from MaterialX import PyMaterialXGenGlsl as mx_glsl
-from MaterialX import PyMaterialXGenShader as mx_gen
 from PIL import Image
 from typer.testing import CliRunner
 
@@ -217,6 +215,9 @@ def test_points_in_no_rows_have_no_maps(tmp_path: Path) -> None:
 
 def test_materialx_takes_the_document(atlas: Path, tmp_path: Path) -> None:
     """Its own library finds it valid and writes a shader of it, with the glTF file's pictures and number."""
+    names = ("MaterialX", "MaterialX.PyMaterialXGenGlsl", "MaterialX.PyMaterialXGenShader")
+    modules: list[Any] = [importlib.import_module(name) for name in names]  # they have no types
+    mx, mx_glsl, mx_gen = modules
     found = fit_texture(atlas, tmp_path / "out", **TOLD)
     document, search = mx.createDocument(), mx.getDefaultDataSearchPath()
     mx.readFromXmlFile(document, str(found.maps[4]))
@@ -229,7 +230,7 @@ def test_materialx_takes_the_document(atlas: Path, tmp_path: Path) -> None:
     colours = mx_gen.DefaultColorManagementSystem.create(generator.getTarget())
     colours.loadLibrary(document)
     generator.setColorManagementSystem(colours)
-    context: Any = mx_gen.GenContext(generator)
+    context = mx_gen.GenContext(generator)
     context.registerSourceCodeSearchPath(search)
     environments = mx_gen.HwSpecularEnvironmentMethod
     context.getOptions().hwSpecularEnvironmentMethod = environments.SPECULAR_ENVIRONMENT_FIS
