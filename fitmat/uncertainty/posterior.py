@@ -108,7 +108,7 @@ class Posterior:
         """The model's parameters, then the discrepancy s where the loss infers it; an objective gives values only.
 
         Value: the best fit. Intervals: `estimate.limits` of the draws where these follow the posterior itself;
-        otherwise `fitting.quantities.by_curvature`.
+        otherwise `fitting.result.by_curvature`.
 
         Args:
             undetermined: Names of parameters, with their channel where there are several, that are not determined

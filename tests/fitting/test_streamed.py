@@ -29,7 +29,7 @@ from fitmat.models.parameters import vector, with_vector
 MODEL = "lambert+blinn-phong"
 
 SAME = 1e-4
-"""Standard deviations; `fitting.fit` itself stops this close to its optimum (`fitting.STEADY`)."""
+"""Standard deviations; `fitting.fit` itself stops this close to its optimum (`refining.STEADY`)."""
 
 SAME_COVARIANCE = 1e-5
 """Relative; where exponent ± 3 % differs by `SAME` of its standard deviation, its curvature differs by this."""

@@ -1,4 +1,4 @@
-"""What a table means: columns, conventions, quantities, channels, masks and notes of `formats.read`."""
+"""What a table means: columns, conventions, quantities, channels, masks and notes of `reader.read`."""
 
 import math
 import os
