@@ -11,7 +11,7 @@ from selection import TRIED, always
 import fitmat as fm
 from fitmat.maths.directions import from_angles as directions
 from fitmat.maths.quadrature import cosine_mean, curve, incidence, incidence_rule, lobe_rule
-from fitmat.models import laws
+from fitmat.models import laws, values
 from fitmat.models.albedo import albedo
 from fitmat.models.base import AbstractBRDF
 
@@ -83,7 +83,8 @@ def _panels(lower: float, upper: float, at: float, finest: float, count: int) ->
 def _over_zenith_and_azimuth(model: AbstractBRDF, degrees: float, count: int = 6) -> np.ndarray:
     """∫ f c_o dω_o in θ_o and φ, with panels that meet where θ_o = θ_i and where Δφ is 0°, 90° and 180°.
 
-    It shares neither its variables nor its nodes with `albedo`; for lobes no narrower than 0.1.
+    It shares neither its variables nor its nodes with `albedo`, but the program of the values; for lobes no narrower
+    than 0.1.
     """
     theta_i = np.deg2rad(degrees)
     theta, d_theta = _panels(0, np.pi / 2, theta_i, 0.005, count)
@@ -92,7 +93,7 @@ def _over_zenith_and_azimuth(model: AbstractBRDF, degrees: float, count: int = 6
     zenith, azimuth = (part.ravel() for part in np.meshgrid(theta, phi, indexing="ij"))
     weight = np.outer(d_theta * np.sin(theta) * np.cos(theta), d_phi).ravel()
     wi = np.tile([np.sin(theta_i), 0.0, np.cos(theta_i)], (len(weight), 1))
-    return weight @ fm.evaluate(model, wi, directions(zenith, azimuth))
+    return weight @ values.at(model, wi, directions(zenith, azimuth))
 
 
 def _within_bounds(model: AbstractBRDF, degrees: tuple[float, ...]) -> None:
