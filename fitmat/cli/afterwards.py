@@ -123,12 +123,14 @@ def export(
     force: ReplaceExportFlag = False,
 ) -> None:
     """Write the fitted material for a renderer, run it there, and say how far it is from the fit."""
-    process.set_up()
-    from fitmat.cli import export
+    from fitmat.cli import session
 
-    options = {"bump": bump, "strict": strict, "verify": not no_verify, "force": force}
-    options |= {"model": model, "name": name} | export.grid(theta_i, step)
-    process.say(str(export.written(result, to, out, **options)))
+    options = {"bump": bump, "strict": strict, "verify": not no_verify, "force": force, "model": model, "name": name}
+    with session.computing() as watch:
+        from fitmat.cli import export
+
+        found = export.written(result, to, out, watch, **options, **export.grid(theta_i, step))
+    process.say(str(found))
 
 
 @app.command(cls=Command, epilog=examples.RENDER)
@@ -145,11 +147,14 @@ def render(
     force: ReplacePictureFlag = False,
 ) -> None:
     """Draw a material on a ball under lights, from our own values: a fitted one, or a model of given values."""
-    process.set_up()
-    from fitmat.cli import render
+    from fitmat.cli import session
 
-    render.refuse(out, hdr=hdr, force=force)
-    found = render.drawn(what, set_ or [], masking, light or [], model=model, size=size, exposure=exposure)
+    with session.computing() as watch:
+        from fitmat.cli import render
+
+        render.refuse(out, hdr=hdr, force=force)
+        options = {"model": model, "size": size, "exposure": exposure}
+        found = render.drawn(what, set_ or [], masking, light or [], watch, **options)
     written = found.save(out, hdr=hdr)
     process.say("\n".join([str(found), *(visible(str(path)) for path in written)]))
 

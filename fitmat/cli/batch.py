@@ -131,7 +131,7 @@ def texture(
         process.use_gpu()
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        with session.watch() as watch:
+        with session.computing() as watch:
             told = {name: studying[name] for name in ("loss", "masking", "fixed")}
             told |= {"threads": doing["threads"], "force": doing["force"]}
             found = fit_texture(source, folder, model, progress=watch, **told)

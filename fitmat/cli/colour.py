@@ -4,12 +4,14 @@ It computes nothing itself.
 """
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from fitmat.cli import session
 from fitmat.colour import observers
 from fitmat.colour.spaces import FROM_SRGB, linear, to_srgb
 from fitmat.errors import FitmatError, ModelError
@@ -17,6 +19,10 @@ from fitmat.models.in_rgb import WAYS, InRgb, fresnel_in_rgb, published
 from fitmat.models.refractive_index import MATERIALS, describe
 from fitmat.models.spectral import absorbs
 from fitmat.text import visible
+
+if TYPE_CHECKING:
+    from fitmat.studies.energies import Energy
+    from fitmat.studies.result import Fitted
 
 TABLES = ("metals", "dielectrics")
 AT = (0, 30, 60, 80)
@@ -90,10 +96,15 @@ def run(folder: str, illuminant: str, plot: Path | None = None, *, force: bool =
     Raises:
         FitmatError: it is no run, its channels have no colour under that light, or the picture cannot be written.
     """
-    from fitmat.studies.colours import colour_of
-    from fitmat.studies.result import load
+    with session.computing() as watch:
+        from fitmat.studies.colours import colour_of
+        from fitmat.studies.result import load
 
-    out, found = Console(), [colour_of(one, illuminant=illuminant) for one in load(folder).fits]
+        found = []
+        for one in load(folder).fits:
+            watch(f"finding the colour of {one.name}", 0, 0)
+            found.append(colour_of(one, illuminant=illuminant))
+    out = Console()
     if plot is not None:
         from fitmat.reports import colour_plot, pictures
 
@@ -112,18 +123,19 @@ def energies(folder: str, illuminant: str) -> None:
     Raises:
         FitmatError: it is no run, or its channels have no colour under that light.
     """
-    from fitmat.studies.energies import ALPHAS, WAYS, energy_of, highlights
-    from fitmat.studies.result import load
+    with session.computing() as watch:
+        from fitmat.studies.energies import WAYS
+        from fitmat.studies.result import load
 
-    out, any_found = Console(), False
-    for one in load(folder).fits:
-        if len(highlights(one)) != 1:
+        each = [(one, _lost(one, illuminant, watch)) for one in load(folder).fits]
+    out = Console()
+    for one, lost in each:
+        if not lost:
             _say(out, f"{visible(one.name)}: no single isotropic lobe of facets.\n")
             continue
-        own, any_found = energy_of(one, illuminant=illuminant), True
+        own = lost[0]
         table = Table("alpha", "", *(f"{angle:.0f}°" for angle in np.rad2deg(own.theta)), box=None, pad_edge=False)
-        others = [alpha for alpha in ALPHAS if f"{alpha:.3g}" != f"{own.alpha:.3g}"]
-        for found in (own, *(energy_of(one, alpha=alpha, illuminant=illuminant) for alpha in others)):
+        for found in lost:
             for way, apart in found.delta_e_2000.items():
                 table.add_row(
                     f"{found.alpha:.3g}{' (fitted)' if found is own else ''}",
@@ -132,8 +144,24 @@ def energies(folder: str, illuminant: str) -> None:
                 )
         _say(out, f"{visible(own.sentence)}\n")
         out.print(table)
-    if any_found:
+    if any(lost for _, lost in each):
         _say(out, "\nΔE2000 from Heitz's random walk by angle of view, under light from everywhere.")
+
+
+def _lost(fitted: "Fitted", illuminant: str, watch: session.Watch) -> list["Energy"]:
+    """What is lost at the fitted roughness, then at those of a table; empty where there is no single highlight."""
+    from fitmat.studies.energies import ALPHAS, energy_of, highlights
+
+    if len(highlights(fitted)) != 1:
+        return []
+    stage, count = f"walking among the facets of {fitted.name}", 1 + len(ALPHAS)
+    watch(stage, 0, count)
+    found = [energy_of(fitted, illuminant=illuminant)]
+    for alpha in ALPHAS:
+        watch(stage, len(found), count)
+        if f"{alpha:.3g}" != f"{found[0].alpha:.3g}":
+            found.append(energy_of(fitted, alpha=alpha, illuminant=illuminant))
+    return found
 
 
 def list_all(kind: str) -> None:

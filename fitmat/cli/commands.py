@@ -97,8 +97,7 @@ def fit(
     """Fit models to a file of measurements and write a report with the Phong–microfacet match."""
     from fitmat.cli import session
 
-    with session.watch() as watch:
-        process.set_up()
+    with session.computing() as watch:
         from fitmat.maths import programs
 
         with programs.ahead("fit"):
@@ -198,10 +197,10 @@ def convert(
     force: ReplaceFlag = False,
 ) -> None:
     """Write measurements in another format; what that cannot hold is said."""
-    (process.set_up if complete else process.refuse_little_memory)()
+    process.refuse_little_memory()
     from fitmat.cli import convert, session
 
-    with session.watch() as watch:
+    with (session.computing if complete else session.watch)() as watch:
         told = convert.written(files, reading, out, watch, force=force, complete=complete, model=model)
     process.say("\n".join([*told, visible(str(out))]))
 
@@ -228,11 +227,10 @@ def design(
     """Say which angles to measure next, and by how much they would narrow what is not yet known."""
     from fitmat.cli import session
 
-    with session.watch() as watch:
-        process.set_up()
+    with session.computing() as watch:
         from fitmat.maths import programs
 
-        with programs.ahead("design"), programs.announced(watch.compiling):
+        with programs.ahead("design"):
             from fitmat.cli import design
             from fitmat.reports.pictures import refuse_picture
 

@@ -9,24 +9,27 @@ from typing import Any
 import numpy as np
 
 from fitmat import files
+from fitmat._types import Progress
 from fitmat.cli.angles import angles
 from fitmat.exports.export import Export, export
 from fitmat.studies.result import RECORD, load
 
 
-def written(run: Path, target: str, folder: Path | None, **options: Any) -> Export:
+def written(run: Path, target: str, folder: Path | None, say: Progress, **options: Any) -> Export:
     """Load a run and export one of its models.
 
     Args:
         run: A run's folder, or its record.
         target: As `fitmat.export`.
         folder: Where to; None for one beside the run, with its name and the target's.
+        say: Is told what is done.
         **options: As `fitmat.export`.
 
     Raises:
         FitmatError: as `fitmat.load` and `fitmat.export`.
     """
     result = load(run)
+    say(f"exporting to {target}", 0, 0)
     place = run.parent if run.name == RECORD else run
     return export(result, target, folder or files.default(place.resolve(), target), **options)
 

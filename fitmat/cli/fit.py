@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from fitmat import files
 from fitmat.cli import interrupts, process, session
 from fitmat.fitting import priors
-from fitmat.maths import program_files, programs
+from fitmat.maths import program_files
 from fitmat.models.parameters import assignments
 from fitmat.reports import page, terminal
 from fitmat.studies.result import RECORD
@@ -96,7 +96,7 @@ def write_report(
     """
     target = folder or files.default(sources[0])
     draft = interrupts.taken_away(files.new(target, own=page.own, force=force), files.abandon)
-    with draft as written, programs.announced(watch.compiling):
+    with draft as written:
         measurements = session.source(sources, reading, watch)
         page.load_ahead()
         found = study(measurements, resume=files.resumed(target), progress=watch, **told)

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from fitmat._types import Progress
 from fitmat.errors import FitmatError
 from fitmat.judgement.laboratories.comparing import Laboratories, compare_laboratories
 from fitmat.measurements.joining import refuse_twice, tails
@@ -19,7 +20,9 @@ from fitmat.measurements.reader import read
 from fitmat.text import visible
 
 
-def compared(files: Sequence[Path], reading: Mapping[str, Any], model: str, fixed: Mapping[str, Any]) -> Laboratories:
+def compared(
+    files: Sequence[Path], reading: Mapping[str, Any], model: str, fixed: Mapping[str, Any], say: Progress
+) -> Laboratories:
     """What the laboratories say of the sample, each with its file's name.
 
     Args:
@@ -27,6 +30,7 @@ def compared(files: Sequence[Path], reading: Mapping[str, Any], model: str, fixe
         reading: Arguments of `fitmat.read`, the same for all.
         model: Name of the model.
         fixed: Parameters to hold.
+        say: Is told what is done.
 
     Raises:
         FitmatError: as `fitmat.read` and `compare_laboratories`.
@@ -36,6 +40,7 @@ def compared(files: Sequence[Path], reading: Mapping[str, Any], model: str, fixe
     refuse_twice(files)
     measured = [read(path, **reading) for path in files]
     names = [tail or m.source for tail, m in zip(tails(files), measured, strict=True)]
+    say(f"comparing {len(files)} laboratories", 0, 0)
     return compare_laboratories(measured, model, names=names, fixed=fixed)
 
 

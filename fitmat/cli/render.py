@@ -7,13 +7,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from fitmat._types import Progress
 from fitmat.cli.simulate import truth
 from fitmat.errors import ModelError
 from fitmat.reports.portrait import Light, Portrait, picture_files, render
 from fitmat.studies.result import load
 
 
-def drawn(what: str, settings: Sequence[str], masking: str | None, lights: Sequence[str], **options: Any) -> Portrait:
+def drawn(
+    what: str, settings: Sequence[str], masking: str | None, lights: Sequence[str], say: Progress, **options: Any
+) -> Portrait:
     """Picture of what is named: a run where there is a file or a folder of that name, else a model.
 
     Args:
@@ -21,6 +24,7 @@ def drawn(what: str, settings: Sequence[str], masking: str | None, lights: Seque
         settings: Parameters of a model, NAME=VALUE.
         masking: Of a model.
         lights: Names of lights, or two angles as "60,150"; none for those of `fitmat.render`.
+        say: Is told what is done.
         **options: model, size and exposure, as `fitmat.render`.
 
     Raises:
@@ -30,11 +34,15 @@ def drawn(what: str, settings: Sequence[str], masking: str | None, lights: Seque
     if not Path(what).exists():
         if options["model"] is not None:
             raise ModelError(f"--model beside {what}, which is no run's folder, expected it with a run. Leave it out.")
-        return render(truth(what, settings, masking)[0], **lit, **options)
+        named = truth(what, settings, masking)[0]
+        say(f"drawing {what}", 0, 0)
+        return render(named, **lit, **options)
     for flag, given in (("--set", settings), ("--masking", masking)):
         if given:
             raise ModelError(f"{flag} beside the run {what}, which has its own values. Leave it out, or name a model.")
-    return render(load(what), **lit, **options)
+    run = load(what)
+    say(f"drawing {what}", 0, 0)
+    return render(run, **lit, **options)
 
 
 def refuse(path: Path, *, hdr: bool, force: bool) -> None:

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from fitmat.measurements.samples import Measurements
 
 
+LOADING = "loading"
+"""What is done before the first stage."""
+
+
 class Watch:
     """What a run tells of its progress on stderr; while it samples, Ctrl-C asks it to stop.
 
@@ -62,12 +66,19 @@ class Watch:
         if sampling and self._asked:
             raise KeyboardInterrupt
 
-    def compiling(self, what: str) -> None:
-        """Say that a program is compiled, which happens once."""
-        words = f"compiling {what or 'what models share'}, once for this machine"
+    def preparing(self, doing: str, what: str) -> None:
+        """Say that a program is compiled, which happens once, or at a terminal that it is loaded.
+
+        Args:
+            doing: "compiling", "loading", or "" when it is done.
+            what: The model, or "".
+        """
+        of = what or "what models share"
+        words = f"compiling {of}, once for this machine" if doing == "compiling" else f"loading {of}" if doing else ""
         if self._bar is not None:
-            self._bar.update(self._task, description=f"{self._stage}: {words}" if self._stage else words, refresh=True)
-        elif words not in self._told:
+            stage = ": ".join(filter(None, (self._stage, words))) or LOADING
+            self._bar.update(self._task, description=stage, refresh=True)
+        elif doing == "compiling" and words not in self._told:
             self._told.add(words)
             self._say(words)
 
@@ -109,19 +120,26 @@ class Watch:
 
 
 @contextlib.contextmanager
-def watch(what: str = "loading") -> Iterator[Watch]:
-    """A `Watch` for as long as the block runs.
-
-    Args:
-        what: What is done before the first stage.
-    """
+def watch() -> Iterator[Watch]:
+    """A `Watch` for as long as the block runs."""
     told = Watch(Console(stderr=True))
-    told.open(what)
+    told.open(LOADING)
     try:
         yield told
     finally:
         told.close()
         sys.stderr.flush()
+
+
+@contextlib.contextmanager
+def computing() -> Iterator[Watch]:
+    """A `Watch` that also says when programs are loaded and compiled; from JAX, which is loaded where it is not."""
+    with watch() as told:
+        process.set_up()
+        from fitmat.maths import programs
+
+        with programs.announced(told.preparing):
+            yield told
 
 
 def source(files: Sequence[Path], reading: Mapping[str, Any], told: Watch) -> "Measurements | Stream":

@@ -57,11 +57,14 @@ def labs(
     fix: FixFlag = None,
 ) -> None:
     """Say whether laboratories that measured one sample agree, what follows from all, and whose calibration is off."""
-    process.set_up()
-    from fitmat.cli import labs
-    from fitmat.models.parameters import assignments
+    from fitmat.cli import session
 
-    found = labs.compared(laboratories, reading | {"instrument": instrument}, model, assignments(fix or [], "--fix"))
+    with session.computing() as watch:
+        from fitmat.cli import labs
+        from fitmat.models.parameters import assignments
+
+        read, held = reading | {"instrument": instrument}, assignments(fix or [], "--fix")
+        found = labs.compared(laboratories, read, model, held, watch)
     if json_:
         process.say(labs.as_json(found))
     else:

@@ -127,18 +127,20 @@ class Program:
         name = f"{self._name}-{hashlib.sha256(words.encode()).hexdigest()[:24]}"
         _USED.append(f"{name} {_KINDS[self._fused]}")
         early = _AHEAD.pop(_USED[-1], None)
-        run = None if early is None else early.result()
-        if run is not None:
-            return run
-        exported = program_files.read(name)
-        if exported is None:
-            _tell(given)
+        with _telling("loading", given):
+            run = None if early is None else early.result()
+            if run is not None:
+                return run
+            exported = program_files.read(name)
+            if exported is not None:
+                return _compiled(_calling(exported, name), shapes, self._fused)
+        with _telling("compiling", given):
             flat.__name__ = name
             exported = _exported(flat, shapes)
             if exported is None:
                 return _compiled(flat, shapes, self._fused)
             program_files.write(name, exported)
-        return _compiled(_calling(exported, name), shapes, self._fused)
+            return _compiled(_calling(exported, name), shapes, self._fused)
 
 
 def _compiled(function: Callable[..., Any], shapes: list[Any], fused: bool) -> Callable[..., Any]:
@@ -177,7 +179,7 @@ def hasty() -> Iterator[None]:
 
 _EVERY: list[Program] = []
 
-_TOLD: list[Callable[[str], None]] = []
+_TOLD: list[Callable[[str, str], None]] = []
 
 _USED: list[str] = []
 
@@ -185,8 +187,12 @@ _AHEAD: dict[str, "Future[Callable[..., Any] | None]"] = {}
 
 
 @contextlib.contextmanager
-def announced(told: Callable[[str], None]) -> Iterator[None]:
-    """Call `told` with the name of the model, or "", before a program is compiled, for as long as the block runs."""
+def announced(told: Callable[[str, str], None]) -> Iterator[None]:
+    """Say when programs are made ready, for as long as the block runs.
+
+    Args:
+        told: Called with "loading" or "compiling" before it is done, with "" when it is, and the model's name or "".
+    """
     _TOLD.append(told)
     try:
         yield
@@ -194,10 +200,16 @@ def announced(told: Callable[[str], None]) -> Iterator[None]:
         _TOLD.remove(told)
 
 
-def _tell(given: tuple[tuple, dict]) -> None:
+@contextlib.contextmanager
+def _telling(doing: str, given: tuple[tuple, dict]) -> Iterator[None]:
     name = next((part.name for part in given[0] if isinstance(getattr(part, "name", None), str)), "")
     for told in _TOLD:
-        told(name)
+        told(doing, name)
+    try:
+        yield
+    finally:
+        for told in _TOLD:
+            told("", name)
 
 
 def program(function: Callable[..., Any]) -> Program:

@@ -3,13 +3,19 @@
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import matplotlib.image
+import numpy as np
 import pytest
 
+import fitmat as fm
 from fitmat.cli import colour
 from fitmat.errors import FitmatError, ModelError
 from fitmat.models.refractive_index import MATERIALS
+from fitmat.studies import energies, result
+from fitmat.studies.energies import Energy
+from fitmat.studies.result import Fitted
 
 
 @pytest.fixture(autouse=True)
@@ -89,6 +95,31 @@ assert not {"colour", "matplotlib", "polars"} & set(sys.modules)
 """
     done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_line_a_stage_where_nobody_watches(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The walk of each model takes seconds, and there are several."""
+    names = {"lambert": fm.model("lambert"), "lambert+ggx": fm.model("lambert+ggx", alpha=0.3)}
+    each = [Fitted(name, one, ("value",), (), "converged", "", (), tmp_path) for name, one in names.items()]
+    monkeypatch.setattr(result, "load", lambda folder: SimpleNamespace(fits=each))
+    said: list[str] = []
+
+    def walked(fitted: Fitted, alpha: float = 0.3, illuminant: str = "D65") -> Energy:
+        said.append(capsys.readouterr().err)
+        numbers = np.zeros(1)
+        return Energy(
+            fitted.name, alpha, numbers, dict.fromkeys(("single", "kulla-conty", "turquin"), numbers), numbers
+        )
+
+    monkeypatch.setattr(energies, "energy_of", walked)
+    colour.show(str(tmp_path), None, "D65", None, force=False, energy=True)
+    assert said == ["Walking among the facets of lambert+ggx.\n", "", "", ""]
+    out = capsys.readouterr().out
+    assert "lambert: no single isotropic lobe of facets." in out
+    assert "0.3 (fitted)" in out
+    assert out.index("ΔE2000 from Heitz's random walk") > out.index("Turquin's factor")
 
 
 def test_tables_are_of_a_known_kind() -> None:

@@ -137,7 +137,9 @@ def test_a_line_a_stage_where_nobody_watches():
         told.open("loading")
         for done in range(3):
             told(f"fitting {name}", done, 3)
-            told.compiling(name)
+            told.preparing("loading", name)
+            told.preparing("compiling", name)
+            told.preparing("", name)
         told("comparing", 0, 0)
         told.close()
         lines = written.getvalue().splitlines()
@@ -149,10 +151,14 @@ def test_the_line_at_a_terminal_is_never_blank():
     told = session.Watch(Console(file=written, width=100, force_terminal=True))
     told.open("loading")
     told("fitting ggx", 0, 0)
-    told.compiling("ggx")
+    told.preparing("compiling", "ggx")
+    told.preparing("", "ggx")
+    told.preparing("loading", "ggx")
     told("sampling ggx", 50, 200)
     told.close()
     shown = written.getvalue()
+    assert shown.index("compiling ggx") < shown.rindex("fitting ggx ") < shown.index("sampling ggx")
     assert all(
-        words in shown for words in ("loading", "fitting ggx", "compiling ggx, once for this machine", "sampling ggx")
+        words in shown
+        for words in ("loading", "fitting ggx", "compiling ggx, once for this machine", "loading ggx", "sampling ggx")
     )

@@ -156,8 +156,9 @@ def test_what_is_not_there_is_refused(result: Path, call: Any, sentence: str) ->
 
 
 def run(*arguments: object) -> tuple[int, str, str]:
+    """The code, what was said but for the stages, and why it ended."""
     ended = CliRunner().invoke(app, [str(a) for a in arguments], prog_name="fitmat", env={"COLUMNS": "300"})
-    return ended.exit_code, ended.output, str(ended.exception or "")
+    return ended.exit_code, ended.stdout, str(ended.exception or "")
 
 
 def test_the_command_writes_beside_the_run(result: Path) -> None:

@@ -254,6 +254,22 @@ def test_a_program_gives_what_the_function_gives(place: Path, given: Arguments, 
         np.testing.assert_allclose(one(other, wi, wo), plain(other, wi, wo), rtol=ROUNDING)
 
 
+def test_what_is_made_ready_is_told(place: Path, given: Arguments) -> None:
+    """Compiled the first time, loaded the second, and nothing where it is in memory; the end of each too."""
+    told: list[tuple[str, str]] = []
+    with programs.announced(lambda *said: told.append(said)):
+        fresh()(*given)
+        first = len(told)
+        again = fresh()
+        again(*given)
+        again(*given)
+    name = "lambert+phong"
+    assert told[:first] == [("loading", name), ("", name), ("compiling", name), ("", name)]
+    assert told[first:] == [("loading", name), ("", name)]
+    fresh()(*given)
+    assert len(told) == 6
+
+
 def test_within_another_program_it_is_the_function(given: Arguments, traced: list[str]) -> None:
     model, wi, wo = given
     one = fresh()

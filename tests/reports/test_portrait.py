@@ -93,14 +93,20 @@ def test_a_run_and_a_model_are_drawn_by_name(tmp_path: Path, monkeypatch: pytest
     result = Result(tmp_path, {"file": "paint", "choice": None, "fits": []}, (one,))
     monkeypatch.setattr("fitmat.cli.render.load", lambda _: result)
     options: dict[str, Any] = {"model": None, "size": 16, "exposure": None}
-    run = drawn(str(tmp_path), [], None, ["30,250"], **options)
-    named = drawn("lambert", ["kd=0.1,0.3,0.6"], None, ["30,250"], **options)
+    told: list[str] = []
+
+    def say(what: str, done: int, total: int) -> None:
+        told.append(what)
+
+    run = drawn(str(tmp_path), [], None, ["30,250"], say, **options)
+    named = drawn("lambert", ["kd=0.1,0.3,0.6"], None, ["30,250"], say, **options)
     assert run.radiance == pytest.approx(named.radiance)
     assert run.radiance[8, 8] == pytest.approx(fm.render(LAMBERT, (30.0, 250.0), size=16).radiance[8, 8, ::-1])
     with pytest.raises(FitmatError, match=r"--set beside the run .* Leave it out, or name a model"):
-        drawn(str(tmp_path), ["kd=0.1"], None, [], **options)
+        drawn(str(tmp_path), ["kd=0.1"], None, [], say, **options)
     with pytest.raises(FitmatError, match="--model beside lambert, which is no run's folder"):
-        drawn("lambert", [], None, [], **options | {"model": "ggx"})
+        drawn("lambert", [], None, [], say, **options | {"model": "ggx"})
+    assert told == [f"drawing {tmp_path}", "drawing lambert"]
 
 
 @pytest.mark.parametrize(
