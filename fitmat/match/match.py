@@ -4,6 +4,7 @@ Judges two fits; draws nothing and prints nothing.
 """
 
 import dataclasses
+import functools
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -110,7 +111,7 @@ class Match:
         """The verdict."""
         return self.verdict
 
-    @property
+    @functools.cached_property
     def verdict(self) -> str:
         """The match in plain sentences; thresholds: `sentences`, `discernibility`, `ablation`, `spheres`."""
         names = _lobe_title(self.empirical.fit.name), _lobe_title(self.microfacet.fit.name)
