@@ -40,7 +40,7 @@ def write(measurements: Measurements, path: str | os.PathLike[str], force: bool 
 
     Raises:
         OutputError: the suffix is unknown, the format cannot hold the measurements, the file exists and `force` is off,
-            or the disk refuses.
+            beside it stands what was inferred in another, or the disk refuses.
     """
     arguments.kind("measurements", measurements, Measurements)
     arguments.kind("path", path, str, os.PathLike)
@@ -48,6 +48,9 @@ def write(measurements: Measurements, path: str | os.PathLike[str], force: bool 
     target = Path(path)
     beside = None if measurements.inferred is None else marks(target)
     _refuse_existing(target, beside, force=force)
+    if beside is None and (stale := marks(target)) is not None and os.path.lexists(stale):
+        got = f"{stale} says that values of {target.name} were inferred, which those to write are not"
+        raise OutputError(f"{got}; choose another name, or move it away.")
     content = _room(target).dump(measurements)
     if lost := losses(measurements, target):
         warnings.warn(f"{target.name}: {' '.join(lost)}", stacklevel=2)

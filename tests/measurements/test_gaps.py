@@ -89,6 +89,11 @@ def test_tables_mark_what_was_inferred_and_other_formats_have_it_beside_them(tmp
     assert (back.value[::2] == whole.value[::2]).all()
     assert back.valid[:, 0].tolist() == [True, False] * 22 + [True]
     assert not (tmp_path / "a.csv.cells.parquet").exists()
+    before = (tmp_path / "a.binary").read_bytes()
+    for name in ("a.alta", "a.binary"):
+        with pytest.raises(FitmatError, match=r"a\.cells\.parquet says that values of a\.\w+ were inferred, which th"):
+            fm.write(whole, tmp_path / name, force=True)
+    assert (tmp_path / "a.binary").read_bytes() == before
 
 
 @pytest.mark.parametrize("names", [("r", "g"), ("front", "back")])
