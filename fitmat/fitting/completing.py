@@ -79,7 +79,7 @@ def completed(
         the surface's own value, that of the others as it was, NaN where it was unknown.
 
     Raises:
-        ModelError: the fit is not finite, or its loss is an objective.
+        ModelError: the fit is not finite, its loss is an objective, or there is nothing to infer.
     """
     m = fit.measurements if measured is None else measured_only(measured)
     if not (fit.finite and fit.loss.posterior):
@@ -88,6 +88,8 @@ def completed(
     whole, some = np.all(m.valid, axis=1), np.any(m.valid, axis=1)
     partly = some & ~whole
     wi, wo = (np.concatenate([w[partly], asked]) for w, asked in ((m.wi, wi), (m.wo, wo)))
+    if not len(wi):
+        raise ModelError(f"{m.source}: no value is masked, and wi has no row, expected one to infer. Name directions.")
     sigma = _noise(fit, m)
     known = m.rows(np.flatnonzero(whole))
     value, sd = _inferred(fit, draws, known, sigma[whole], wi, wo, progress or (lambda *_: None))

@@ -112,6 +112,8 @@ def test_what_cannot_be_inferred_is_said(holes: Any) -> None:
         posterior.complete(m.wi[:2], m.wo[:2] * [[1.0], [2.0]])
     with pytest.raises(FitmatError, match=r"2 rows of wi and 3 of wo, expected as many"):
         posterior.complete(m.wi[:2], m.wo[:3])
+    with pytest.raises(FitmatError, match=r"no value is masked, and wi has no row, expected one to infer"):
+        posterior.complete(m.wi[:0], m.wo[:0])
     aim = fm.laplace(fm.fit(m.rows(np.flatnonzero(~held)), "lambert", loss="log10"), seed=0)
     with pytest.raises(FitmatError, match=r"nothing can be inferred, for the loss log10 gives no interval; exp"):
         aim.complete(m.wi[:1], m.wo[:1])
