@@ -34,7 +34,16 @@ MORE_HASTE = "jax_disable_most_optimizations"
 CAREFUL = {"test_base", "test_random_walk", "test_position_free", "test_streamed"}
 """Files that run longer than they compile, or whose slopes lie close to underflow."""
 
-COMPILES = {"test_laws", "test_albedo", "test_exchange", "test_coat", "test_recovery"}
+COMPILES = {
+    "test_albedo",
+    "test_channelwise",
+    "test_coat",
+    "test_exchange",
+    "test_lacquer",
+    "test_laws",
+    "test_losses",
+    "test_recovery",
+}
 """Files whose studies compile longer than they compute: hastily there as well."""
 
 KNOWS_HASTE = "0.10."

@@ -133,15 +133,16 @@ def value(
     for i, o in zip(wi, wo, strict=True):
         enter, leave = (1 - interface(w[None, 2], eta)[0] for w in (i, o))
         w, up = (np.tile(refracted(x[None], eta), (count, 1)) for x in (i, o))
-        total, weight = np.zeros(count), np.full(count, enter * leave / eta**2)
+        total, weight, where = np.zeros(count), np.full(count, enter * leave / eta**2), np.arange(count)
         for _ in range(BOUNCES):
             weight = weight * np.exp(-depth / w[:, 2])
-            total += weight * np.exp(-depth / up[:, 2]) * base.value(w, up)
+            total[where] += weight * np.exp(-depth / up[where, 2]) * base.value(w, up[where])
             w, kept = base.scatter(w, rng)
             back, _ = interface(w[:, 2], 1 / eta)
             weight = weight * kept * back * np.exp(-depth / w[:, 2])
-            w = w * [-1.0, -1.0, 1.0]
-            if weight.max() < LEAST:
+            alive = weight >= LEAST
+            w, weight, where = w[alive] * [-1.0, -1.0, 1.0], weight[alive], where[alive]
+            if not len(w):
                 break
         found.append((total.mean(), total.std() / np.sqrt(count)))
     means, errors = np.array(found).T
