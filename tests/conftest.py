@@ -40,6 +40,7 @@ COMPILES = {
     "test_coat",
     "test_exchange",
     "test_lacquer",
+    "test_laboratories",
     "test_laws",
     "test_losses",
     "test_recovery",
