@@ -37,7 +37,7 @@ def maps(fits: Fits) -> dict[str, bytes]:
     level = next((name for name in ("f0", "eta") if name in names), None)
     if fits.outcome.ndim != 2 or len(fits.channels) not in (1, 3) or level is None or not {"kd", "alpha"} <= names:
         return {}
-    fitted = np.isfinite(fits["alpha"]) & np.isin(fits.result, ("converged", "at_bound", "max_steps"))
+    fitted = determined(fits)
     if not fitted.any():
         return {}
     reflected = fits[level] if level == "f0" else f0_from_eta(fits[level])
@@ -52,6 +52,11 @@ def maps(fits: Fits) -> dict[str, bytes]:
         SCENE: _scene(most).encode("ascii"),
         NODES: _nodes(most).encode("ascii"),
     }
+
+
+def determined(fits: Fits) -> Bool[np.ndarray, "..."]:
+    """Which points have a fit that a map shows."""
+    return np.isin(fits.result, ("converged", "at_bound"))
 
 
 def _coloured(part: np.ndarray) -> Float[np.ndarray, "rows columns 3"]:

@@ -31,6 +31,9 @@ CAMERA = ("theta_o", "phi_o")
 LAYERS = (("R", "G", "B"), ("Y",))
 """Channels of a picture, in the order of preference."""
 
+CHROMA = {"RY", "BY"}
+"""Channels beside Y that hold colour."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Stack:
@@ -72,46 +75,61 @@ def read_photographs(table: Path) -> Atlas:
         table: CSV with the columns `picture`, an OpenEXR file relative to the table's folder; `theta_i` and `phi_i`,
             degrees, where its light is, far away, phi from the right side of the picture towards its upper one; and
             `irradiance` E of a surface that faces the light, in radiances of the picture times sr: π L of white that
-            faces it. If need be `theta_o` and `phi_o` of the camera, which is above the sample if not.
+            faces it. If need be `theta_o` and `phi_o` of the camera, which is above the sample if not. Lines that begin
+            with # are comments.
 
     Raises:
         FitmatError: the table or a picture cannot be read, a number is not possible, or pictures do not fit together;
             the package OpenEXR is missing.
     """
+    rows = _rows(table)
+    names = rows["picture"].to_list()
+    for k, name in enumerate(names):
+        if name is None:
+            raise ReadError(f"{table}: row {k + 1} has no picture, expected the name of an OpenEXR file in each.")
+        if name in names[:k]:
+            got = f"{visible(name)} stands in rows {names.index(name) + 1} and {k + 1}"
+            raise ReadError(f"{table}: {got}, expected a picture of its own in each.")
+    told = {name: _numbers(table, rows, name) for name in (*COLUMNS[1:], *CAMERA)}
+    _refuse_impossible(table, told)
+    if "phi_o" not in rows.columns and told["theta_o"].any():
+        raise ReadError(f"{table}: theta_o without phi_o, expected both: where the camera is.")
+    pictures = [_picture(table.parent / name) for name in names]
+    for name, picture in zip(names, pictures, strict=True):
+        if picture.words != pictures[0].words:
+            got = f"{picture.words}, expected {pictures[0].words} as in {visible(names[0])}"
+            raise ReadError(f"{table.parent / name}: {got}: they lie upon each other.")
+    factor = 1.0 / (told["irradiance"] * np.cos(np.deg2rad(told["theta_i"])))
+    wi, wo = (directions(told[f"theta_{end}"], told[f"phi_{end}"], degrees=True) for end in ("i", "o"))
+    value = Stack(tuple(picture.layers for picture in pictures), factor)
+    return Atlas(str(table), value, None, wi, wo, default_channels(value.shape[-1]))
+
+
+def _rows(table: Path) -> pl.DataFrame:
+    """The table as texts without spaces around them, None where there are none; rows of nothing are left out."""
     try:
-        rows = pl.read_csv(table, comment_prefix="#")
+        found = pl.read_csv(table, comment_prefix="#", infer_schema=False)
     except (OSError, pl.exceptions.PolarsError) as error:
         first = str(getattr(error, "strerror", None) or error).partition("\n")[0]
         expected = f"Write CSV with the columns {', '.join(COLUMNS)}."
         raise ReadError(f"{table}: no table of lights can be read ({visible(first)}). {expected}") from error
-    odd = sorted(set(rows.columns) - {*COLUMNS, *CAMERA})
-    if odd or not set(COLUMNS) <= set(rows.columns) or not len(rows):
-        got = f"a column {visible(odd[0])!r}" if odd else f"columns {', '.join(map(visible, rows.columns))}"
-        got = got if len(rows) else "no row"
+    names = [name.strip() for name in found.columns]
+    odd = sorted(set(names) - {*COLUMNS, *CAMERA})
+    if odd or not set(COLUMNS) <= set(names) or len(set(names)) < len(names):
+        got = f"a column {visible(odd[0])!r}" if odd else f"columns {', '.join(map(visible, names))}"
         raise ReadError(f"{table}: {got}, expected {', '.join(COLUMNS)}, and if need be {' and '.join(CAMERA)}.")
-    told = {name: _numbers(table, rows, name) for name in (*COLUMNS[1:], *CAMERA)}
-    _refuse_impossible(table, told)
-    pictures, layers = zip(*(_picture(table, name) for name in rows["picture"].to_list()), strict=True)
-    for name, picture, layer in zip(rows["picture"], pictures, layers, strict=True):
-        if (picture.shape, layer) != (pictures[0].shape, layers[0]):
-            got, expected = (
-                f"{of.shape[2]} × {of.shape[1]} pixels of {', '.join(what)}"
-                for of, what in ((picture, layer), (pictures[0], layers[0]))
-            )
-            first = visible(str(rows["picture"][0]))
-            raise ReadError(
-                f"{table.parent / name}: {got}, expected {expected} as in {first}: they lie upon each other."
-            )
-    factor = 1.0 / (told["irradiance"] * np.cos(np.deg2rad(told["theta_i"])))
-    wi, wo = (directions(told[f"theta_{end}"], told[f"phi_{end}"], degrees=True) for end in ("i", "o"))
-    return Atlas(str(table), Stack(pictures, factor), None, wi, wo, default_channels(len(layers[0])))
+    texts = found.rename(dict(zip(found.columns, names, strict=True))).with_columns(pl.all().str.strip_chars())
+    texts = texts.with_columns(pl.all().replace("", None)).filter(~pl.all_horizontal(pl.all().is_null()))
+    if not len(texts):
+        raise ReadError(f"{table}: no row, expected {', '.join(COLUMNS)} of each picture.")
+    return texts
 
 
 def _numbers(table: Path, rows: pl.DataFrame, name: str) -> Float[np.ndarray, " n"]:
     """A column of finite numbers; 0 where the table has not that of the camera."""
     if name not in rows.columns:
         return np.zeros(len(rows))
-    found = rows[name].cast(pl.Float64, strict=False).to_numpy()
+    found = rows[name].cast(pl.Float64, strict=False).fill_null(np.nan).to_numpy()
     if not np.isfinite(found).all():
         k = int(np.argmin(np.isfinite(found)))
         got = "nothing" if rows[name][k] is None else repr(visible(str(rows[name][k])))
@@ -120,36 +138,59 @@ def _numbers(table: Path, rows: pl.DataFrame, name: str) -> Float[np.ndarray, " 
 
 
 def _refuse_impossible(table: Path, told: dict[str, np.ndarray]) -> None:
-    """Directions below the horizon, light that is none, and degrees that look like radians."""
+    """Directions that are none, or below the horizon, light that is none, and degrees that look like radians."""
     possible = {name: (told[name] >= 0) & (told[name] < 90) for name in ("theta_i", "theta_o")}
-    possible["irradiance"] = told["irradiance"] > 0
+    possible |= {name: np.abs(told[name]) <= 360 for name in ("phi_i", "phi_o")}
+    with np.errstate(over="ignore", divide="ignore"):
+        possible["irradiance"] = (told["irradiance"] > 0) & np.isfinite(1.0 / told["irradiance"])
+    expected = {"irradiance": "above 0", "phi_i": "-360 to 360 degrees", "phi_o": "-360 to 360 degrees"}
     for name, fine in possible.items():
         if not fine.all():
             k = int(np.argmin(fine))
-            expected = "above 0" if name == "irradiance" else "0 to below 90 degrees"
-            raise ReadError(f"{table}: row {k + 1}: {name} is {told[name][k]:g}, expected {expected}.")
+            what = expected.get(name, "0 to below 90 degrees")
+            raise ReadError(f"{table}: row {k + 1}: {name} is {told[name][k]:g}, expected {what}.")
     if DOUBTFUL[0] < (most := float(told["theta_i"].max())) <= DOUBTFUL[1]:
         got = f"no theta_i exceeds {most:.3g}, expected degrees; they look like radians"
         raise ReadError(f"{table}: {got}. Convert them.")
 
 
-def _picture(table: Path, name: Any) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Radiances of a picture, (c, rows, columns), and the names of its layers."""
-    if not isinstance(name, str):
-        raise ReadError(f"{table}: a row without a picture, expected the name of an OpenEXR file in each.")
-    path = table.parent / name
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Picture:
+    """A picture; what must be the same of all is in words.
+
+    Attributes:
+        layers: Radiances, (c, rows, columns).
+        words: Its size, its place in the window of the lens, and its channels.
+    """
+
+    layers: np.ndarray
+    words: str
+
+    __repr__ = brief
+
+
+def _picture(path: Path) -> _Picture:
     if path.suffix.lower() != ".exr":
         raise ReadError(
             f"{path}: expected an OpenEXR picture (.exr), whose values are linear in radiance. Develop it so."
         )
+    if not path.is_file():
+        raise ReadError(f"{path}: no such file, expected a picture of the table.")
     reader = needed("OpenEXR", f"{path}: a picture")
     try:
         with reader.File(str(path), separate_channels=True) as file:
+            parts, (corner, _) = len(file.parts), file.header()["dataWindow"]
             found = {layer: np.array(channel.pixels) for layer, channel in file.channels().items()}
     except (OSError, RuntimeError, ValueError) as error:
-        raise ReadError(f"{path}: no picture can be read ({visible(str(error))}). Is it there, and whole?") from error
+        raise ReadError(f"{path}: no picture can be read ({visible(str(error))}). Is it whole?") from error
+    if parts > 1:
+        raise ReadError(f"{path}: {parts} pictures in one file, expected one. Write each into a file of its own.")
     layers = next((every for every in LAYERS if set(every) <= found.keys()), None)
-    if layers is None or len({found[layer].shape for layer in layers}) > 1:
+    if layers is None or len({found[layer].shape for layer in layers}) > 1 or found.keys() & CHROMA:
         got = ", ".join(map(visible, sorted(found))) or "none"
-        raise ReadError(f"{path}: channels {got}, expected R, G and B, or Y, each of every pixel.")
-    return np.stack([found[layer] for layer in layers]), layers
+        raise ReadError(f"{path}: channels {got}, expected R, G and B, or Y alone, each of every pixel.")
+    every = np.stack([found[layer] for layer in layers])
+    if (alpha := found.get("A")) is not None:
+        every = np.where(alpha < 1.0, np.array(np.nan, every.dtype), every)
+    corner = " × ".join(str(int(at)) for at in corner)
+    return _Picture(every, f"{every.shape[2]} × {every.shape[1]} pixels of {', '.join(layers)} from {corner} on")

@@ -103,10 +103,11 @@ def fit_texture(
         keys = [_key(atlas, *atlas.tile(part), model, told) for part in slices(count, TILE)]
         of = {name: record.digest([axes, atlas.channels, keys])}
         claim = record.claimed(target, of, (name, *MAPS), force=force)
-        each = []
+        each, words = [], f"fitting {count} points"
+        say(words, 0, count)
         for part, key in zip(slices(count, TILE), keys, strict=True):
             each.append(_fitted(atlas, part, target / PARTS / f"{key}.npz", model, told))
-            say(f"fitting {count} points", part.stop, count)
+            say(words, part.stop, count)
         whole = {field: np.concatenate([tile[field] for tile, _ in each]) for field in KEPT}
         shaped: dict[str, Any] = {field: part.reshape(*axes, *part.shape[1:]) for field, part in whole.items()}
         fits = Fits(shared.template, atlas.channels, held, **shaped)

@@ -17,6 +17,7 @@ from rich.text import Text
 
 from fitmat.batches.atlas import SUFFIXES
 from fitmat.batches.batch import PAGE, Batch, batch
+from fitmat.batches.maps import determined
 from fitmat.batches.photographs import TABLE
 from fitmat.batches.textures import fit_texture
 from fitmat.cli import interrupts, process, session
@@ -138,14 +139,21 @@ def texture(
     except KeyboardInterrupt:
         process.say(f"fitmat: interrupted; what was done is kept in {folder}: the same command goes on.", err=True)
         raise SystemExit(interrupts.INTERRUPTED) from None
-    drawn = f"\nMaps: {', '.join(path.name for path in found.maps)}" if found.maps else ""
+    result = found.fits.result
+    measured, others = result != "too_few", int(np.count_nonzero(~determined(found.fits)))
+    median = f"; {others} of {result.size} points, whose fits are not determined, have the others' median in them"
+    drawn = f"\nMaps: {', '.join(path.name for path in found.maps)}{median if others else ''}" if found.maps else ""
     process.say(f"{found}\n\nArrays: {found.file}{drawn}")
-    measured = found.fits.result != "too_few"
-    ended = np.count_nonzero(found.fits.result[measured] != "converged")
+    ended = np.count_nonzero(result[measured] != "converged")
     if ended or not measured.any():
-        count = found.fits.result.size
-        got = f"{ended} of {count} points are not determined or did not converge" if ended else "no point has a fit"
-        process.say(f"fitmat: {got}: see outcome there. Are value, sigma and the model what you mean?", err=True)
+        got = (
+            f"{ended} of {result.size} points are not determined or did not converge" if ended else "no point has a fit"
+        )
+        given = "the irradiance" if source.suffix.lower() == TABLE else "value, sigma"
+        advice = (
+            f"Are {given} and the model what you mean? What the angles leave open --fix says, as ks=1 of a bare surface"
+        )
+        process.say(f"fitmat: {got}: see outcome there. {advice}.", err=True)
         raise SystemExit(process.NOT_CONVERGED)
 
 

@@ -1,5 +1,6 @@
 """Photographs: pictures under one light each are fitted as what made them, and wrong tables are one sentence."""
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -82,6 +83,23 @@ def test_a_grey_picture_and_what_is_not_finite(tmp_path: Path) -> None:
     np.testing.assert_array_equal(atlas.wo, [[0.0, 0.0, 1.0]])
 
 
+def test_tables_as_people_write_them(table: Path, tmp_path: Path) -> None:
+    """Spaces, comments, empty lines, a mark of byte order and decimals far down change nothing; A < 1 is masked."""
+    lines = [f"{k:03}.exr , 10, 0 ,2" for k in range(110)] + ["110.exr, 10.5, 0, 2", ",,,", ""]
+    picture = np.ones((ROWS, COLUMNS), np.float32)
+    alpha = np.where(np.arange(COLUMNS) == 1, 0.5, 1.0) * picture
+    for k in range(111):
+        draw(tmp_path / f"{k:03}.exr", {"RGB": np.stack([picture] * 3, 2)})
+    draw(tmp_path / "000.exr", {"RGBA": np.stack([*([picture] * 3), alpha], 2).astype(np.float32)})
+    text = "\ufeffpicture, theta_i,phi_i ,irradiance\r\n# by hand\r\n" + "\r\n".join(lines)
+    (tmp_path / "lights.csv").write_text(text, encoding="utf-8")
+    atlas = read_photographs(tmp_path / "lights.csv")
+    value, _ = atlas.tile(slice(0, ROWS * COLUMNS))
+    assert value.shape == (ROWS * COLUMNS, 111, 3)
+    np.testing.assert_array_equal(np.isnan(value[:, 0, 0]), np.tile(np.arange(COLUMNS) == 1, ROWS))
+    np.testing.assert_allclose(value[0, 110], 0.5 / np.cos(np.deg2rad(10.5)), rtol=1e-7)
+
+
 GOOD = "picture,theta_i,phi_i,irradiance\n00.exr,10,0,2\n01.exr,20,0,2\n"
 
 
@@ -89,7 +107,7 @@ GOOD = "picture,theta_i,phi_i,irradiance\n00.exr,10,0,2\n01.exr,20,0,2\n"
     ("content", "message"),
     [
         ("", "no table of lights can be read"),
-        ("picture,theta_i,phi_i,irradiance\n", "no row, expected picture, theta_i, phi_i, irradiance"),
+        ("picture,theta_i,phi_i,irradiance\n,,,\n", "no row, expected picture, theta_i, phi_i, irradiance"),
         ("picture,theta_i\n00.exr,10\n", "columns picture, theta_i, expected picture"),
         (GOOD.replace("phi_i", "azimuth"), "a column 'azimuth', expected picture"),
         (GOOD.replace("20", "much"), "row 2: theta_i is 'much', expected a number"),
@@ -98,16 +116,36 @@ GOOD = "picture,theta_i,phi_i,irradiance\n00.exr,10,0,2\n01.exr,20,0,2\n"
         (GOOD.replace("20", "90"), "row 2: theta_i is 90, expected 0 to below 90 degrees"),
         (GOOD.replace("10", "0.2").replace("20", "0.9"), "they look like radians. Convert them."),
         (GOOD.replace("01.exr", "01.png"), "01.png: expected an OpenEXR picture"),
-        (GOOD.replace("01.exr", "no.exr"), "no.exr: no picture can be read"),
+        (GOOD.replace("01.exr", "no.exr"), "no.exr: no such file, expected a picture"),
         (GOOD.replace("01.exr", "broken.exr"), "broken.exr: no picture can be read"),
-        (GOOD.replace("01.exr", "wide.exr"), "wide.exr: 5 × 3 pixels of R, G, B, expected 4 × 3 pixels of R, G, B"),
+        (GOOD.replace("01.exr", "wide.exr"), "wide.exr: 5 × 3 pixels of R, G, B from 0 × 0 on, expected 4 × 3"),
         (GOOD.replace("01.exr", "depth.exr"), "depth.exr: channels Z, expected R, G and B, or Y"),
-        (GOOD.replace("01.exr", ""), "a row without a picture, expected the name"),
+        (GOOD.replace("01.exr", "moved.exr"), "moved.exr: 4 × 3 pixels of R, G, B from 2 × 0 on, expected 4 × 3"),
+        (GOOD.replace("01.exr", "stereo.exr"), "stereo.exr: 2 pictures in one file, expected one"),
+        (GOOD.replace("01.exr", "chroma.exr"), "chroma.exr: channels BY, RY, Y, expected R, G and B, or Y alone"),
+        (GOOD.replace("01.exr", "pipe.exr"), "pipe.exr: no such file"),
+        (GOOD.replace("01.exr", ""), "row 2 has no picture, expected the name"),
+        (GOOD.replace("01.exr", "00.exr"), "00.exr stands in rows 1 and 2, expected a picture of its own"),
+        (GOOD.replace("20,0,2", "20,400,2"), "row 2: phi_i is 400, expected -360 to 360 degrees"),
+        (GOOD.replace("20,0,2", "20,0,1e-320"), "row 2: irradiance is 9.99989e-321, expected above 0"),
+        (GOOD.replace("20,0,2", "20,0,true"), "row 2: irradiance is 'true', expected a number"),
+        ("picture,theta_i,phi_i,irradiance,theta_o\n00.exr,10,0,2,30\n", "theta_o without phi_o, expected both"),
     ],
 )
 def test_wrong_tables_are_one_sentence(content: str, message: str, table: Path, tmp_path: Path) -> None:
     draw(tmp_path / "wide.exr", {"RGB": np.ones((3, 5, 3), np.float32)})
     draw(tmp_path / "depth.exr", {"Z": np.ones((3, 4), np.float32)})
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    pixels = {"RGB": np.ones((3, 4, 3), np.float32)}
+    window = {
+        "dataWindow": (np.array([2, 0], np.int32), np.array([5, 2], np.int32)),
+        "displayWindow": (np.array([0, 0], np.int32), np.array([7, 2], np.int32)),
+    }
+    OpenEXR.File(header | window, pixels).write(str(tmp_path / "moved.exr"))
+    parts = [OpenEXR.Part(dict(header), dict(pixels), name) for name in ("left", "right")]
+    OpenEXR.File(parts).write(str(tmp_path / "stereo.exr"))
+    draw(tmp_path / "chroma.exr", {name: np.ones((3, 4), np.float32) for name in ("Y", "RY", "BY")})
+    os.mkfifo(tmp_path / "pipe.exr")
     (tmp_path / "broken.exr").write_bytes((tmp_path / "00.exr").read_bytes()[:60])
     table.write_text(content)
     with pytest.raises(FitmatError) as caught:
