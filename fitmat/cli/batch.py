@@ -142,7 +142,9 @@ def texture(
     result = found.fits.result
     measured, others = result != "too_few", int(np.count_nonzero(~determined(found.fits)))
     median = f"; {others} of {result.size} points, whose fits are not determined, have the others' median in them"
-    drawn = f"\nMaps: {', '.join(path.name for path in found.maps)}{median if others else ''}" if found.maps else ""
+    drawn = "\nNo maps: no point has a fit that is determined." if others == result.size else ""
+    if found.maps:
+        drawn = f"\nMaps: {', '.join(path.name for path in found.maps)}{median if others else ''}"
     process.say(f"{found}\n\nArrays: {found.file}{drawn}")
     ended = np.count_nonzero(result[measured] != "converged")
     if ended or not measured.any():

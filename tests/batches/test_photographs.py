@@ -178,6 +178,17 @@ def test_the_command_fits_pictures(table: Path, tmp_path: Path) -> None:
         np.testing.assert_allclose(kept["alpha"], ALPHA, rtol=1e-4)
 
 
+def test_what_the_angles_leave_open_is_said(table: Path, tmp_path: Path) -> None:
+    """Six lights near the normal: ks, eta and alpha trade off, and no map is drawn."""
+    kept = table.read_text().split("\n")
+    table.write_text("\n".join(line for k, line in enumerate(kept) if k < 7))
+    ran = CliRunner().invoke(app, ["batch", "--lights", str(table), "--out", str(tmp_path / "out")])
+    assert ran.exit_code == 3, ran.output
+    assert "No maps: no point has a fit that is determined." in ran.output
+    assert "Are the irradiance and the model what you mean?" in ran.output
+    assert "--fix says" in ran.output
+
+
 def test_an_atlas_of_pictures_equals_that_of_arrays(table: Path, tmp_path: Path) -> None:
     """The same values in a .npz file give the same fits, bit for bit."""
     atlas = read_photographs(table)

@@ -164,6 +164,20 @@ def test_what_angles_cannot_determine_is_said() -> None:
     assert found.result.tolist() == ["unidentifiable"]
 
 
+def test_a_ridge_does_not_end_where_another_start_goes_on() -> None:
+    """One camera above: ks, eta and alpha trade off, and the way from the grid's one valley leads to eta = 50.
+
+    Without noise the optimum is the surface itself.
+    """
+    wi = fm.directions([0, 10, 20, 30, 40, 50, 60, 70, 15, 25], 40.0, degrees=True)
+    wo = fm.directions(np.zeros(10), degrees=True)
+    alpha = np.linspace(0.15, 0.46, 8)
+    value = np.stack([0.3 / np.pi + brdf(wi, wo, r, 1.5) for r in alpha])
+    found = fm.fit_many(wi, wo, value)
+    np.testing.assert_allclose(found["eta"], 1.5, rtol=0.01)
+    np.testing.assert_allclose(found["alpha"], alpha, rtol=0.01)
+
+
 def test_a_bound_is_said_and_has_no_deviation() -> None:
     value, sigma = surfaces(2)
     found = fm.fit_many(WI, WO, value + 0.5, "lambert+ggx", sigma=sigma, loss="gaussian", fixed={"ks": 1.0, "eta": 1.5})

@@ -66,7 +66,8 @@ def fit_many(
         fixed: Parameters to hold, by name, the same for all: `{"ks": 1.0}`.
         loss: As in `fitmat.fit`, but for those that infer the noise.
         masking: Static masking choice for the microfacet lobes of a named model.
-        starts: From how many valleys of the start grid a fit begins, at most.
+        starts: From how many valleys of the start grid a fit begins, at most; one that goes to a bound or does not
+            settle begins again at the grid's six best nodes.
         max_steps: Levenberg–Marquardt iterations per start.
         threads: How many work side by side; None for one for each core.
         pool: Parameters in which the surfaces are taken to be of one kind: each is drawn to the others as far as its

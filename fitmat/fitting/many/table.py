@@ -1,7 +1,7 @@
 """Table: where many fits begin, from one grid for all of them, in which the weights (kd, ks) are solved exactly.
 
 As `starts` has it for one fit, but for two things: nodes are ranked by the squares that are linear in the weights, and
-taken one from each valley of the grid. It refines none of them.
+one from each valley of the grid comes first. It refines none of them.
 """
 
 import itertools
@@ -15,10 +15,14 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from fitmat.fitting.many.lanes import Samples, Shared
+from fitmat.fitting.refining import STARTS
 from fitmat.fitting.stabilising import spread
 from fitmat.fitting.starts import lit, nodes
 from fitmat.maths.programs import program_run_often
 from fitmat.models.parameters import entries
+
+NODES = STARTS
+"""Best nodes of the grid, wherever they lie, from which a fit begins again; as many as those of a single fit."""
 
 
 class Table(eqx.Module):
@@ -61,20 +65,27 @@ def table(shared: Shared, held: Mapping[str, np.ndarray]) -> Table:
 @program_run_often
 def begin_many(
     known: Table, samples: Samples, first: ArrayLike, count: int
-) -> tuple[Float[Array, "T S p"], Float[Array, "T S"]]:
-    """The starts of every surface, and the cost of each; infinite where the grid has fewer valleys.
+) -> tuple[Float[Array, "T N p"], Float[Array, "T N"]]:
+    """The starts of every surface, and the cost of each: of `count` valleys of the grid, then of its best `NODES`.
+
+    The cost is infinite where the grid has fewer valleys, and of a node that is one of them.
 
     Args:
         known: The grid.
         samples: Of the T surfaces.
         first: Discrepancy under which the nodes are ranked, (T,).
-        count: S.
+        count: Most valleys, S; N is S + `NODES`, or less of a smaller grid.
     """
     x, weight = jnp.asarray(samples.x), jnp.asarray(samples.weight)
     importance = weight / spread(x, jnp.asarray(samples.noise), jnp.asarray(first)[:, None, None]) ** 2
     solved = [_weights(known, x[:, :, c], importance[:, :, c], c) for c in range(x.shape[2])]
-    cost = _valleys(sum(part for _, part in solved[1:]) + solved[0][1], known.grid)
+    whole = sum(part for _, part in solved[1:]) + solved[0][1]
+    cost = _valleys(whole, known.grid)
     least, place = jax.lax.top_k(-cost, min(count, cost.shape[1]))
+    others, beside = jax.lax.top_k(jnp.nan_to_num(-whole, nan=-jnp.inf), min(NODES, cost.shape[1]))
+    known_already = jnp.any((beside[:, :, None] == place[:, None]) & jnp.isfinite(least)[:, None], axis=2)
+    least = jnp.concatenate([least, jnp.where(known_already, -jnp.inf, others)], axis=1)
+    place = jnp.concatenate([place, beside], axis=1)
     chosen = jnp.asarray(known.dark)[place]
     for k, (start, stop) in enumerate(known.places):
         each = [jnp.take_along_axis(weights[k], place, 1) for weights, _ in solved]

@@ -17,6 +17,7 @@ from fitmat.fitting.many.gathering import counted, first_discrepancies, gathered
 from fitmat.fitting.many.lanes import Samples, Shared
 from fitmat.fitting.many.solving import Ends, solve_many
 from fitmat.fitting.many.table import Table, begin_many
+from fitmat.maths.parts import slices
 from fitmat.models.parameters import vector
 from fitmat.text import brief
 
@@ -80,15 +81,13 @@ class Work:
         samples = gathered(shared, value, sigma, size)
         counts = counted(samples)
         first = first_discrepancies(samples)
-        begun, cost = (np.asarray(part) for part in begin_many(self.known, samples, first, self.starts))
-        surface, valley = np.nonzero(np.isfinite(cost) & (counts >= moved.count + 2)[:, None])
-        ends = self._ends(samples, surface, begun[surface, valley], first)
+        ends, surface = self._ends(samples, first, counts >= moved.count + 2)
         best = _best(ends, surface, size)
-        values = np.full((size, begun.shape[2]), np.nan)
+        values = np.full((size, len(self.known.dark[0])), np.nan)
         s, solved, steps = np.zeros(size), np.zeros(size, bool), np.zeros(size, int)
         there = np.flatnonzero(best >= 0)
         end = Ends(*(part[best[there]] for part in ends))
-        values[there] = moved.filled(np.asarray(vector(shared.template)), moved.natural_of(end.u))
+        values[there] = self._values(end)
         s[there], solved[there], steps[there] = end.discrepancy, end.solved, end.steps
         known = judged(
             shared, samples, np.where(np.isfinite(values), values, self.known.dark[0]), s, solved, self.block(size)
@@ -107,16 +106,43 @@ class Work:
         }
         return {name: part[: len(value)] for name, part in found.items()}
 
-    def _ends(self, samples: Samples, surface: np.ndarray, starts: Float[np.ndarray, "L p"], first: np.ndarray) -> Ends:
-        """Where the fits end that begin at these starts of these surfaces."""
-        count, capacity = len(surface), len(samples.x) * self.starts
+    def _values(self, ends: Ends) -> Float[np.ndarray, "L p"]:
+        """The parameters there."""
         moved = self.shared.moved
-        u, of = np.zeros((capacity, moved.count)), np.zeros(capacity, int)
-        u[:count], of[:count] = moved.unbounded(starts), surface
-        found = solve_many(
-            self.shared, samples, of, u, first, np.array([count, self.max_steps]), self.block(len(samples.x))
-        )
-        return Ends(*(np.asarray(part)[:count] for part in found))
+        return moved.filled(np.asarray(vector(self.shared.template)), moved.natural_of(ends.u))
+
+    def _ends(self, samples: Samples, first: np.ndarray, usable: np.ndarray) -> tuple[Ends, np.ndarray]:
+        """Where the fits of usable surfaces end, and of which surface each is.
+
+        They begin in the valleys of the grid. Where parameters trade off, the way from there may lead to a bound, or
+        never settle: such surfaces begin again at the best nodes, wherever these lie.
+        """
+        begun, cost = (np.asarray(part) for part in begin_many(self.known, samples, first, self.starts))
+        there = np.isfinite(cost) & usable[:, None]
+        surface, start = np.nonzero(there[:, : self.starts])
+        ends = self._solved(samples, surface, begun[surface, start], first)
+        best = _best(ends, surface, len(usable))
+        bounded = self.shared.moved.side(self._values(ends)).any(axis=1)
+        doubtful = np.append(~ends.solved | bounded, False)[best]
+        again, node = np.nonzero(there[:, self.starts :] & doubtful[:, None])
+        if not len(again):
+            return ends, surface
+        more = self._solved(samples, again, begun[again, self.starts + node], first)
+        return Ends(*map(np.concatenate, zip(ends, more, strict=True))), np.concatenate([surface, again])
+
+    def _solved(
+        self, samples: Samples, surface: np.ndarray, starts: Float[np.ndarray, "L p"], first: np.ndarray
+    ) -> Ends:
+        """Where the fits end that begin at these starts of these surfaces, so many in a call as are compiled for."""
+        size, moved = len(samples.x), self.shared.moved
+        capacity, found = size * self.starts, []
+        for part in list(slices(len(surface), capacity)) or [slice(0, 0)]:
+            count = part.stop - part.start
+            u, of = np.zeros((capacity, moved.count)), np.zeros(capacity, int)
+            u[:count], of[:count] = moved.unbounded(starts[part]), surface[part]
+            ended = solve_many(self.shared, samples, of, u, first, np.array([count, self.max_steps]), self.block(size))
+            found.append([np.asarray(one)[:count] for one in ended])
+        return Ends(*map(np.concatenate, zip(*found, strict=True)))
 
 
 def _best(ends: Ends, surface: np.ndarray, size: int) -> np.ndarray:
