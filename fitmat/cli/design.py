@@ -12,7 +12,7 @@ import numpy as np
 
 from fitmat._types import Progress
 from fitmat.judgement.design.design import MATCH, Design, Proposal, next_angles
-from fitmat.match.match import is_microfacet
+from fitmat.match.kinds import is_microfacet
 from fitmat.measurements.reader import read
 from fitmat.models.parameters import assignments
 from fitmat.reports.pictures import write_picture

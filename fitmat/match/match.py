@@ -20,6 +20,7 @@ from fitmat.match.appearance.spheres import Perceived, perceived
 from fitmat.match.discernibility import Telling, tell_apart
 from fitmat.match.distances import ANGLES, Distances, PairedDraws, measure_distances
 from fitmat.match.imitation import Imitation, imitate
+from fitmat.match.kinds import is_empirical, refuse_unlike
 from fitmat.match.pairing import paired_draws
 from fitmat.match.sentences import CLOSE as CLOSE
 from fitmat.match.sentences import SIMILAR as SIMILAR
@@ -28,7 +29,6 @@ from fitmat.maths.blas import one_thread
 from fitmat.measurements.incidences import incidence_range, incidences
 from fitmat.models.conversion import alpha_from_exponent, exponent_from_alpha
 from fitmat.models.metrics import METRICS
-from fitmat.models.registry import LOBES, lobe_names
 from fitmat.text import brief
 from fitmat.uncertainty.estimate import Estimate, band, estimate
 from fitmat.uncertainty.laplace import laplace
@@ -167,16 +167,6 @@ def _lobe_title(name: str) -> str:
     return name.removeprefix("lambert+")
 
 
-def is_empirical(name: str) -> bool:
-    """Whether a model name has an empirical specular lobe."""
-    return any(LOBES[part].kind == "empirical" for part in lobe_names(name))
-
-
-def is_microfacet(name: str) -> bool:
-    """Whether a model name has a lobe with a Fresnel term."""
-    return any(LOBES[part].kind == "microfacet" for part in lobe_names(name))
-
-
 @one_thread()
 def compare(
     one: Posterior | Fit,
@@ -209,7 +199,7 @@ def compare(
     if pictures and not spheres:
         raise FitmatError("pictures without spheres, expected spheres = True: they are what is drawn. Leave one out.")
     both = [given if isinstance(given, Fit) else given.fit for given in (one, other)]
-    _refuse_unlike(*both)
+    refuse_unlike(*both)
     first, second = (laplace(given, seed=0) if isinstance(given, Fit) else given for given in (one, other))
     empirical, microfacet = (first, second) if is_empirical(both[0].name) else (second, first)
     fits, models = (empirical.fit, microfacet.fit), (empirical.fit.model, microfacet.fit.model)
@@ -236,23 +226,6 @@ def compare(
 def _imitated(what: Fit, by: Fit) -> list[Imitation]:
     """The model of one fit closest to that of another, in each of `IMITATED`."""
     return [imitate(what, by.model, metric) for metric in IMITATED]
-
-
-def _refuse_unlike(*fits: Fit) -> None:
-    one, other = fits if is_empirical(fits[0].name) else fits[::-1]
-    if not (is_empirical(one.name) and is_microfacet(other.name)):
-        known = ", ".join(name for name, lobe in LOBES.items() if lobe.kind == "empirical")
-        raise FitmatError(
-            f"compare needs one empirical ({known}) and one microfacet model, got {one.name} and {other.name}."
-        )
-    for fit in (one, other):
-        if not fit.finite:
-            raise FitmatError(f"{fit.name}: the fit ended {fit.result}, there is nothing to compare; check the data.")
-    first, second = one.measurements, other.measurements
-    same = all(np.array_equal(getattr(first, name), getattr(second, name)) for name in ("wi", "wo", "value", "valid"))
-    if first is not second and not same:
-        got = f"fits to {first.source} ({first.n_samples} samples) and {second.source} ({second.n_samples} samples)"
-        raise FitmatError(f"compare needs two fits to the same measurements, got {got}.")
 
 
 def _concluded(pair: tuple[Posterior, Posterior], found: Distances, **parts: Any) -> Match:

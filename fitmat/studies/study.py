@@ -22,7 +22,8 @@ from fitmat.judgement.identifiability.verdicts import identify
 from fitmat.judgement.prediction import sections
 from fitmat.judgement.predictive.check import check_predictions
 from fitmat.judgement.yardstick import yardstick
-from fitmat.match.match import Match, compare, is_empirical, is_microfacet
+from fitmat.match.kinds import is_empirical, is_microfacet
+from fitmat.match.match import Match, compare
 from fitmat.match.pairing import paired_draws
 from fitmat.maths.blas import one_thread
 from fitmat.measurements.large.stream import Stream
