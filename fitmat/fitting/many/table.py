@@ -80,9 +80,9 @@ def begin_many(
     importance = weight / spread(x, jnp.asarray(samples.noise), jnp.asarray(first)[:, None, None]) ** 2
     solved = [_weights(known, x[:, :, c], importance[:, :, c], c) for c in range(x.shape[2])]
     whole = sum(part for _, part in solved[1:]) + solved[0][1]
-    cost = _valleys(whole, known.grid)
-    least, place = jax.lax.top_k(-cost, min(count, cost.shape[1]))
-    others, beside = jax.lax.top_k(jnp.nan_to_num(-whole, nan=-jnp.inf), min(NODES, cost.shape[1]))
+    cost = jnp.where(jnp.isnan(whole), jnp.inf, whole)
+    least, place = jax.lax.top_k(-_valleys(cost, known.grid), min(count, cost.shape[1]))
+    others, beside = jax.lax.top_k(-cost, min(NODES, cost.shape[1]))
     known_already = jnp.any((beside[:, :, None] == place[:, None]) & jnp.isfinite(least)[:, None], axis=2)
     least = jnp.concatenate([least, jnp.where(known_already, -jnp.inf, others)], axis=1)
     place = jnp.concatenate([place, beside], axis=1)
@@ -132,7 +132,7 @@ def _eliminated(matrix: Sequence[Sequence[Array]], right: Sequence[Array]) -> li
 
 def _valleys(cost: Float[Array, "T m"], grid: tuple[int, ...]) -> Float[Array, "T m"]:
     """The costs at nodes that are no higher than their neighbours along the axes of the grid, infinite elsewhere."""
-    cost = jnp.where(jnp.isnan(cost), jnp.inf, cost).reshape(-1, *grid)
+    cost = cost.reshape(-1, *grid)
     lowest = jnp.ones(cost.shape, bool)
     for axis in range(1, cost.ndim):
         edge = jnp.full_like(jnp.take(cost, jnp.array([0]), axis=axis), jnp.inf)
