@@ -6,7 +6,7 @@ Values of a Zarr group are read when they are asked for, some points at a time. 
 import dataclasses
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -192,10 +192,8 @@ def _directions(path: Path, found: Mapping[str, np.ndarray]) -> tuple[np.ndarray
     if vectors or not {"theta_i", "theta_o"} <= set(angles):
         got = ", ".join([*vectors, *angles]) or "none"
         raise ReadError(f"{path}: directions {got}, expected wi and wo, or theta_i and theta_o (degrees).")
-    most = max(float(np.nanmax(np.abs(found[name]), initial=0.0)) for name in ("theta_i", "theta_o"))
-    if DOUBTFUL[0] < most <= DOUBTFUL[1]:
-        got = f"no zenith angle exceeds {most:.3g}, expected degrees; they look like radians"
-        raise ReadError(f"{path}: {got}. Convert them, or give wi and wo.")
+    zeniths = [found[name] for name in ("theta_i", "theta_o")]
+    refuse_radians(path, "zenith angle", zeniths, "Convert them, or give wi and wo.")
     told = {"phi_i": np.zeros(()), "phi_o": np.full((), 180.0)} | {name: found[name] for name in angles}
     try:
         theta_i, theta_o, phi_i, phi_o = np.broadcast_arrays(*(np.atleast_1d(told[name]) for name in ANGLES))
@@ -203,6 +201,17 @@ def _directions(path: Path, found: Mapping[str, np.ndarray]) -> tuple[np.ndarray
         shapes = ", ".join(f"{name} {told[name].shape}" for name in ANGLES)
         raise ReadError(f"{path}: angles of shapes {shapes}, expected (n,) or one number each.") from None
     return directions(theta_i, phi_i, degrees=True), directions(theta_o, phi_o, degrees=True)
+
+
+def refuse_radians(path: Path, name: str, angles: Sequence[np.ndarray], remedy: str) -> None:
+    """Stop where angles that should be degrees are all as small as radians would be.
+
+    Raises:
+        ReadError: they are.
+    """
+    most = max(float(np.nanmax(np.abs(angle), initial=0.0)) for angle in angles)
+    if DOUBTFUL[0] < most <= DOUBTFUL[1]:
+        raise ReadError(f"{path}: no {name} exceeds {most:.3g}, expected degrees; they look like radians. {remedy}")
 
 
 def _channels(path: Path, found: Mapping[str, np.ndarray], count: int) -> tuple[str, ...]:

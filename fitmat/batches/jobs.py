@@ -19,6 +19,7 @@ from fitmat.errors import ReadError
 from fitmat.fitting import priors
 from fitmat.measurements.parsing.constants import CONSTANTS
 from fitmat.models.parameters import assignments
+from fitmat.text import visible
 
 FILE = "file"
 """Column of a table of jobs that names the measurements."""
@@ -113,17 +114,32 @@ def from_table(table: Path, reading: Mapping[str, Any], studying: Mapping[str, A
     Raises:
         FitmatError: it cannot be read, or a column is none of these, or a cell means nothing.
     """
-    try:
-        rows = pl.read_csv(table, comment_prefix="#")
-    except (OSError, pl.exceptions.PolarsError) as error:
-        first = str(getattr(error, "strerror", None) or error).partition("\n")[0]
-        raise ReadError(f"{table}: no table of jobs can be read ({first}). Write CSV with a column {FILE}.") from error
+    rows = read_table(table, "jobs", f"a column {FILE}")
     known = {FILE, *READING, *CONSTANTS, *STUDYING, *ASSIGNED}
     odd = sorted(set(rows.columns) - known)
     if FILE not in rows.columns or odd:
         got = f"a column {odd[0]!r}" if FILE in rows.columns else f"columns {', '.join(rows.columns)}"
         raise ReadError(f"{table}: {got}, expected {FILE} and any of {', '.join(sorted(known - {FILE}))}.")
     return [_job(table, row, reading, studying) for row in rows.iter_rows(named=True)]
+
+
+def read_table(table: Path, of: str, having: str, *, infer_schema: bool = True) -> pl.DataFrame:
+    """A table in CSV, in which lines that begin with # are comments.
+
+    Args:
+        table: The file.
+        of: What the table is of.
+        having: What it must have, for the sentence where it cannot be read.
+        infer_schema: Whether cells are read as numbers where a column has nothing else.
+
+    Raises:
+        ReadError: it cannot be read.
+    """
+    try:
+        return pl.read_csv(table, comment_prefix="#", infer_schema=infer_schema)
+    except (OSError, pl.exceptions.PolarsError) as error:
+        first = visible(str(getattr(error, "strerror", None) or error).partition("\n")[0])
+        raise ReadError(f"{table}: no table of {of} can be read ({first}). Write CSV with {having}.") from error
 
 
 def _job(table: Path, row: Mapping[str, Any], reading: Mapping[str, Any], studying: Mapping[str, Any]) -> Job:

@@ -11,11 +11,11 @@ import numpy as np
 import polars as pl
 from jaxtyping import Float
 
-from fitmat.batches.atlas import Atlas
+from fitmat.batches.atlas import Atlas, refuse_radians
+from fitmat.batches.jobs import read_table
 from fitmat.errors import ReadError
 from fitmat.extras import needed
 from fitmat.maths.directions import directions
-from fitmat.measurements.parsing.angles import DOUBTFUL
 from fitmat.measurements.samples import default_channels
 from fitmat.text import brief, visible
 
@@ -107,12 +107,7 @@ def read_photographs(table: Path) -> Atlas:
 
 def _rows(table: Path) -> pl.DataFrame:
     """The table as texts without spaces around them, None where there are none; rows of nothing are left out."""
-    try:
-        found = pl.read_csv(table, comment_prefix="#", infer_schema=False)
-    except (OSError, pl.exceptions.PolarsError) as error:
-        first = str(getattr(error, "strerror", None) or error).partition("\n")[0]
-        expected = f"Write CSV with the columns {', '.join(COLUMNS)}."
-        raise ReadError(f"{table}: no table of lights can be read ({visible(first)}). {expected}") from error
+    found = read_table(table, "lights", f"the columns {', '.join(COLUMNS)}", infer_schema=False)
     names = [name.strip() for name in found.columns]
     odd = sorted(set(names) - {*COLUMNS, *CAMERA})
     if odd or not set(COLUMNS) <= set(names) or len(set(names)) < len(names):
@@ -149,9 +144,7 @@ def _refuse_impossible(table: Path, told: dict[str, np.ndarray]) -> None:
             k = int(np.argmin(fine))
             what = expected.get(name, "0 to below 90 degrees")
             raise ReadError(f"{table}: row {k + 1}: {name} is {told[name][k]:g}, expected {what}.")
-    if DOUBTFUL[0] < (most := float(told["theta_i"].max())) <= DOUBTFUL[1]:
-        got = f"no theta_i exceeds {most:.3g}, expected degrees; they look like radians"
-        raise ReadError(f"{table}: {got}. Convert them.")
+    refuse_radians(table, "theta_i", [told["theta_i"]], "Convert them.")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -191,6 +184,6 @@ def _picture(path: Path) -> _Picture:
         raise ReadError(f"{path}: channels {got}, expected R, G and B, or Y alone, each of every pixel.")
     every = np.stack([found[layer] for layer in layers])
     if (alpha := found.get("A")) is not None:
-        every = np.where(alpha < 1.0, np.array(np.nan, every.dtype), every)
+        every = np.where(alpha < 1.0, np.nan, every)
     corner = " × ".join(str(int(at)) for at in corner)
     return _Picture(every, f"{every.shape[2]} × {every.shape[1]} pixels of {', '.join(layers)} from {corner} on")

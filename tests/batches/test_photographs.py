@@ -100,6 +100,16 @@ def test_tables_as_people_write_them(table: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(value[0, 110], 0.5 / np.cos(np.deg2rad(10.5)), rtol=1e-7)
 
 
+def test_whole_numbers_have_holes_too(tmp_path: Path) -> None:
+    layers = {name: np.full((ROWS, COLUMNS), 3, np.uint32) for name in "RGB"}
+    alpha = np.ones((ROWS, COLUMNS), np.float32)
+    alpha[1, 1] = 0.0
+    draw(tmp_path / "a.exr", layers | {"A": alpha})
+    (tmp_path / "lights.csv").write_text("picture,theta_i,phi_i,irradiance\na.exr,60,0,4\n")
+    value, _ = read_photographs(tmp_path / "lights.csv").tile(slice(0, ROWS * COLUMNS))
+    np.testing.assert_allclose(value[:, 0, 0], np.where(alpha.ravel() > 0, 1.5, np.nan), rtol=1e-12)
+
+
 GOOD = "picture,theta_i,phi_i,irradiance\n00.exr,10,0,2\n01.exr,20,0,2\n"
 
 
