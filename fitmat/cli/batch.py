@@ -19,7 +19,7 @@ from fitmat.batches.atlas import SUFFIXES
 from fitmat.batches.batch import PAGE, Batch, batch
 from fitmat.batches.maps import determined
 from fitmat.batches.photographs import TABLE
-from fitmat.batches.textures import fit_texture
+from fitmat.batches.textures import Texture, fit_texture
 from fitmat.cli import interrupts, process, session
 from fitmat.cli.flags.fitting import MODELS
 from fitmat.errors import FitmatError
@@ -139,24 +139,29 @@ def texture(
     except KeyboardInterrupt:
         process.say(f"fitmat: interrupted; what was done is kept in {folder}: the same command goes on.", err=True)
         raise SystemExit(interrupts.INTERRUPTED) from None
-    result = found.fits.result
-    measured, others = result != "too_few", int(np.count_nonzero(~determined(found.fits)))
-    median = f"; {others} of {result.size} points, whose fits are not determined, have the others' median in them"
-    drawn = "\nNo maps: no point has a fit that is determined." if others == result.size else ""
-    if found.maps:
-        drawn = f"\nMaps: {', '.join(path.name for path in found.maps)}{median if others else ''}"
-    process.say(f"{found}\n\nArrays: {found.file}{drawn}")
-    ended = np.count_nonzero(result[measured] != "converged")
-    if ended or not measured.any():
-        got = (
-            f"{ended} of {result.size} points are not determined or did not converge" if ended else "no point has a fit"
-        )
+    process.say(f"{found}\n\nArrays: {found.file}{_maps_told(found)}")
+    measured = found.fits.result[found.fits.result != "too_few"]
+    ended, count = np.count_nonzero(measured != "converged"), found.fits.result.size
+    if ended or not measured.size:
+        got = f"{ended} of {count} points are not determined or did not converge" if ended else "no point has a fit"
         given = "the irradiance" if source.suffix.lower() == TABLE else "value, sigma"
-        advice = (
-            f"Are {given} and the model what you mean? What the angles leave open --fix says, as ks=1 of a bare surface"
+        process.say(
+            f"fitmat: {got}: see outcome there. Are {given} and the model what you mean? "
+            "What the angles leave open --fix says, as ks=1 of a bare surface.",
+            err=True,
         )
-        process.say(f"fitmat: {got}: see outcome there. {advice}.", err=True)
         raise SystemExit(process.NOT_CONVERGED)
+
+
+def _maps_told(found: Texture) -> str:
+    """Which maps there are, and how many points are not in them, as a line."""
+    count, others = found.fits.result.size, int(np.count_nonzero(~determined(found.fits)))
+    if others == count:
+        return "\nNo maps: no point has a fit that is determined."
+    if not found.maps:
+        return ""
+    median = f"; {others} of {count} points, whose fits are not determined, have the others' median in them"
+    return f"\nMaps: {', '.join(path.name for path in found.maps)}{median if others else ''}"
 
 
 def show(found: Batch, screen: Console | None = None) -> None:

@@ -108,10 +108,8 @@ def batch(
     told |= {"dispersion": dispersion, "film": film, "sampling": mcmc} | fit.known(fix or [], prior or [])
     read = reading | {"instrument": instrument}
     if lights is not None or batch.is_texture(files or []):
-        idle, doing = (
-            {"jobs": jobs, "scheduler": scheduler, "pool": pool},
-            {"threads": processes, "device": device, "force": force},
-        )
+        idle = {"jobs": jobs, "scheduler": scheduler, "pool": pool}
+        doing = {"threads": processes, "device": device, "force": force}
         return batch.texture(batch.alone(lights, files or []), out, idle, read, told, doing)
     doing = {"processes": processes, "scheduler": scheduler, "device": device, "pool": pool, "force": force}
     found = batch.run(files or [], out, jobs, read, told, doing)
