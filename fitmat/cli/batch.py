@@ -4,7 +4,6 @@ It fits nothing itself.
 """
 
 import logging
-import signal
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,7 @@ from fitmat.batches.atlas import SUFFIXES
 from fitmat.batches.batch import PAGE, Batch, batch
 from fitmat.batches.maps import determined
 from fitmat.batches.photographs import TABLE
-from fitmat.batches.textures import Texture, fit_texture
+from fitmat.batches.textures import TILE, Texture, fit_texture
 from fitmat.cli import interrupts, process, session
 from fitmat.cli.flags.fitting import MODELS
 from fitmat.errors import FitmatError
@@ -64,11 +63,10 @@ def run(
         )
     if odd := next((source for source in sources if is_texture([source])), None):
         raise FitmatError(f"{odd}: a texture beside other files, expected it alone. Give one texture at a time.")
-    signal.signal(signal.SIGINT, signal.default_int_handler)
     if doing["scheduler"] is not None:
         logging.disable(logging.ERROR)  # Dask tells at length what becomes one sentence
     try:
-        with session.watch() as watch:
+        with session.watch() as watch, interrupts.raised():
             known = {"jobs": jobs, "reading": reading, "studying": told, **doing}
             return batch(sources, folder, models, progress=watch, **known)
     except KeyboardInterrupt:
@@ -130,15 +128,18 @@ def texture(
         raise FitmatError(f"--models {models} for a texture, expected one: every point has the same model.")
     if doing["device"] == "gpu":
         process.use_gpu()
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        with session.computing() as watch:
-            told = {name: studying[name] for name in ("loss", "masking", "fixed")}
-            told |= {"threads": doing["threads"], "force": doing["force"]}
-            found = fit_texture(source, folder, model, progress=watch, **told)
-    except KeyboardInterrupt:
-        process.say(f"fitmat: interrupted; what was done is kept in {folder}: the same command goes on.", err=True)
-        raise SystemExit(interrupts.INTERRUPTED) from None
+    told = {name: studying[name] for name in ("loss", "masking", "fixed")}
+    told |= {"threads": doing["threads"], "force": doing["force"]}
+    with session.computing() as watch:
+        try:
+            with interrupts.raised():
+                found = fit_texture(source, folder, model, progress=watch, **told)
+        except KeyboardInterrupt:
+            watch.close()
+            kept = f"{watch.done:,} points are kept in {folder}: the same command goes on"
+            none = f"this run kept no points, which it does {TILE:,} at a time"
+            process.say(f"fitmat: interrupted; {kept if watch.done else none}.", err=True)
+            interrupts.leave_threads()
     process.say(f"{found}\n\nArrays: {found.file}{_maps_told(found)}")
     measured = found.fits.result[found.fits.result != "too_few"]
     ended, count = np.count_nonzero(measured != "converged"), found.fits.result.size

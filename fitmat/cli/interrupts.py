@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from types import FrameType
+from typing import NoReturn
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C."""
@@ -29,6 +30,28 @@ def leave_on_interrupt(discard: Callable[[], None] = lambda: None) -> None:
         os._exit(INTERRUPTED)
 
     signal.signal(signal.SIGINT, leave)
+
+
+@contextmanager
+def raised() -> Iterator[None]:
+    """Ctrl-C as a KeyboardInterrupt while the block runs, so that what was done is kept; a second one ends at once."""
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        leave_on_interrupt()
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def leave_threads() -> NoReturn:
+    """End the program after Ctrl-C without waiting for its threads: what is compiled cannot be stopped."""
+    with suppress(OSError):
+        sys.stdout.flush()
+    os._exit(INTERRUPTED)
 
 
 @contextmanager

@@ -33,6 +33,9 @@ class Watch:
 
     At a terminal it is one line with a bar, elsewhere a line for each stage. The first Ctrl-C during sampling is raised
     as KeyboardInterrupt at the next step, so that what was done is kept; a second one, and any other, is as before.
+
+    Attributes:
+        done: How far the stage is.
     """
 
     def __init__(self, screen: Console) -> None:
@@ -40,7 +43,7 @@ class Watch:
         self._bar: Progress | None = None
         self._task = TaskID(0)
         self._before: Any = None
-        self._asked = False
+        self._asked, self.done = False, 0
 
     def open(self, what: str) -> None:
         """Show that something is going on, at a terminal only, before there is a stage."""
@@ -57,6 +60,7 @@ class Watch:
 
     def __call__(self, what: str, done: int, total: int) -> None:
         """Show the stage; stop where that was asked for."""
+        self.done = done
         what = visible(what)
         sampling = what.startswith(SAMPLING)
         if what != self._stage:

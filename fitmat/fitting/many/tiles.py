@@ -156,7 +156,7 @@ def _best(ends: Ends, surface: np.ndarray, size: int) -> np.ndarray:
 
 
 def each(one: Callable[[slice], Found], count: int, size: int, threads: int, say: Progress | None) -> Found:
-    """Of all surfaces, in their order.
+    """Of all surfaces, in their order; after Ctrl-C or an error nothing is waited for that has begun.
 
     Args:
         one: Of some.
@@ -178,5 +178,5 @@ def each(one: Callable[[slice], Found], count: int, size: int, threads: int, say
             if say is not None:
                 say(f"fitting {count} surfaces", done, count)
     finally:
-        pool.shutdown(cancel_futures=True)
+        pool.shutdown(wait=False, cancel_futures=True)
     return {name: np.concatenate([some[name] for some in found]) for name in found[0]}
