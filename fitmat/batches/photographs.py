@@ -28,6 +28,9 @@ COLUMNS = ("picture", "theta_i", "phi_i", "irradiance")
 CAMERA = ("theta_o", "phi_o")
 """Columns that it may have, 0 if not: where the camera is."""
 
+NOISE = "sigma"
+"""Column that it may have: the standard deviation of the picture's radiances."""
+
 LAYERS = (("R", "G", "B"), ("Y",))
 """Channels of a picture, in the order of preference."""
 
@@ -68,15 +71,40 @@ class Stack:
         return found.transpose(2, 3, 0, 1)
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Noise:
+    """One standard deviation for all values of a picture, as an array of the values' shape.
+
+    Attributes:
+        shape: (rows, columns, n, c).
+        each: In sr⁻¹, (n,).
+    """
+
+    shape: tuple[int, ...]
+    each: Float[np.ndarray, " n"]
+
+    __repr__ = brief
+
+    @property
+    def dtype(self) -> Any:
+        """As of a NumPy array."""
+        return self.each.dtype
+
+    def __getitem__(self, part: slice, /) -> Float[np.ndarray, "r w n c"]:
+        """Of some of the rows."""
+        rows = len(range(*part.indices(self.shape[0])))
+        return np.broadcast_to(self.each[:, None], (rows, *self.shape[1:]))
+
+
 def read_photographs(table: Path) -> Atlas:
-    """Pictures as an atlas, f = L/(E cosθ_i).
+    """Pictures as an atlas, f = L/(E cosθ_i), whose noise is that of L, over the same.
 
     Args:
         table: CSV with the columns `picture`, an OpenEXR file relative to the table's folder; `theta_i` and `phi_i`,
             degrees, where its light is, far away, phi from the right side of the picture towards its upper one; and
             `irradiance` E of a surface that faces the light, in radiances of the picture times sr: π L of white that
-            faces it. If need be `theta_o` and `phi_o` of the camera, which is above the sample if not. Lines that begin
-            with # are comments.
+            faces it. If need be `theta_o` and `phi_o` of the camera, which is above the sample if not, and `sigma`, the
+            standard deviation of a picture's radiances. Lines that begin with # are comments.
 
     Raises:
         FitmatError: the table or a picture cannot be read, a number is not possible, or pictures do not fit together;
@@ -90,7 +118,8 @@ def read_photographs(table: Path) -> Atlas:
         if name in names[:k]:
             got = f"{visible(name)} stands in rows {names.index(name) + 1} and {k + 1}"
             raise ReadError(f"{table}: {got}, expected a picture of its own in each.")
-    told = {name: _numbers(table, rows, name) for name in (*COLUMNS[1:], *CAMERA)}
+    of_noise = [NOISE] if NOISE in rows.columns else []
+    told = {name: _numbers(table, rows, name) for name in (*COLUMNS[1:], *CAMERA, *of_noise)}
     _refuse_impossible(table, told)
     if "phi_o" not in rows.columns and told["theta_o"].any():
         raise ReadError(f"{table}: theta_o without phi_o, expected both: where the camera is.")
@@ -102,17 +131,18 @@ def read_photographs(table: Path) -> Atlas:
     factor = 1.0 / (told["irradiance"] * np.cos(np.deg2rad(told["theta_i"])))
     wi, wo = (directions(told[f"theta_{end}"], told[f"phi_{end}"], degrees=True) for end in ("i", "o"))
     value = Stack(tuple(picture.layers for picture in pictures), factor)
-    return Atlas(str(table), value, None, wi, wo, default_channels(value.shape[-1]))
+    noise = Noise(value.shape, told[NOISE] * factor) if NOISE in told else None
+    return Atlas(str(table), value, noise, wi, wo, default_channels(value.shape[-1]))
 
 
 def _rows(table: Path) -> pl.DataFrame:
     """The table as texts without spaces around them, None where there are none; rows of nothing are left out."""
     found = read_table(table, "lights", f"the columns {', '.join(COLUMNS)}", infer_schema=False)
     names = [name.strip() for name in found.columns]
-    odd = sorted(set(names) - {*COLUMNS, *CAMERA})
+    odd = sorted(set(names) - {*COLUMNS, *CAMERA, NOISE})
     if odd or not set(COLUMNS) <= set(names) or len(set(names)) < len(names):
         got = f"a column {visible(odd[0])!r}" if odd else f"columns {', '.join(map(visible, names))}"
-        raise ReadError(f"{table}: {got}, expected {', '.join(COLUMNS)}, and if need be {' and '.join(CAMERA)}.")
+        raise ReadError(f"{table}: {got}, expected {', '.join(COLUMNS)}, and if need be {', '.join((*CAMERA, NOISE))}.")
     texts = found.rename(dict(zip(found.columns, names, strict=True))).with_columns(pl.all().str.strip_chars())
     texts = texts.with_columns(pl.all().replace("", None)).filter(~pl.all_horizontal(pl.all().is_null()))
     if not len(texts):
@@ -133,12 +163,18 @@ def _numbers(table: Path, rows: pl.DataFrame, name: str) -> Float[np.ndarray, " 
 
 
 def _refuse_impossible(table: Path, told: dict[str, np.ndarray]) -> None:
-    """Directions that are none, or below the horizon, light that is none, and degrees that look like radians."""
+    """Directions that are none, or below the horizon, light or noise that is none, and degrees like radians."""
     possible = {name: (told[name] >= 0) & (told[name] < 90) for name in ("theta_i", "theta_o")}
     possible |= {name: np.abs(told[name]) <= 360 for name in ("phi_i", "phi_o")}
     with np.errstate(over="ignore", divide="ignore"):
         possible["irradiance"] = (told["irradiance"] > 0) & np.isfinite(1.0 / told["irradiance"])
-    expected = {"irradiance": "above 0", "phi_i": "-360 to 360 degrees", "phi_o": "-360 to 360 degrees"}
+    possible |= {NOISE: told[NOISE] > 0} if NOISE in told else {}
+    expected = {
+        "irradiance": "above 0",
+        NOISE: "above 0",
+        "phi_i": "-360 to 360 degrees",
+        "phi_o": "-360 to 360 degrees",
+    }
     for name, fine in possible.items():
         if not fine.all():
             k = int(np.argmin(fine))

@@ -112,6 +112,8 @@ def test_whole_numbers_have_holes_too(tmp_path: Path) -> None:
 
 GOOD = "picture,theta_i,phi_i,irradiance\n00.exr,10,0,2\n01.exr,20,0,2\n"
 
+NOISY = "picture,theta_i,phi_i,irradiance,sigma\n00.exr,10,0,2,0.1\n01.exr,20,0,2,0.2\n"
+
 
 @pytest.mark.parametrize(
     ("content", "message"),
@@ -139,6 +141,9 @@ GOOD = "picture,theta_i,phi_i,irradiance\n00.exr,10,0,2\n01.exr,20,0,2\n"
         (GOOD.replace("20,0,2", "20,400,2"), "row 2: phi_i is 400, expected -360 to 360 degrees"),
         (GOOD.replace("20,0,2", "20,0,1e-320"), "row 2: irradiance is 9.99989e-321, expected above 0"),
         (GOOD.replace("20,0,2", "20,0,true"), "row 2: irradiance is 'true', expected a number"),
+        (NOISY.replace("0.2", ""), "row 2: sigma is nothing, expected a number"),
+        (NOISY.replace("0.2", "0"), "row 2: sigma is 0, expected above 0"),
+        (NOISY.replace("0.1", "-1"), "row 1: sigma is -1, expected above 0"),
         ("picture,theta_i,phi_i,irradiance,theta_o\n00.exr,10,0,2,30\n", "theta_o without phi_o, expected both"),
     ],
 )
@@ -207,3 +212,26 @@ def test_an_atlas_of_pictures_equals_that_of_arrays(table: Path, tmp_path: Path)
     told: dict[str, Any] = {"fixed": {"ks": 1.0}}
     one, other = (fit_texture(path, tmp_path / path.stem, **told) for path in (table, tmp_path / "atlas.npz"))
     np.testing.assert_array_equal(one.fits.values, other.fits.values)
+
+
+def test_noise_of_pictures_equals_that_of_arrays(table: Path, tmp_path: Path) -> None:
+    """σ_L/(E cosθ_i) as `sigma` of a .npz file gives the same fits under a loss that needs it, bit for bit."""
+    lines = table.read_text().split("\n")
+    noise = 0.002 * (1.0 + np.arange(len(LIGHTS)))
+    told = [f"{line},{sd:g}" for line, sd in zip(lines[1:], noise, strict=True)]
+    table.write_text("\n".join([lines[0] + ",sigma", *told]))
+    atlas = read_photographs(table)
+    value, sigma = atlas.tile(slice(0, ROWS * COLUMNS))
+    assert isinstance(sigma, np.ndarray)
+    theta, _, irradiance = np.array(LIGHTS).T
+    expected = noise / (irradiance * np.cos(np.deg2rad(theta)))
+    np.testing.assert_allclose(sigma, np.broadcast_to(expected[:, None], sigma.shape), rtol=1e-12)
+    part: Any = atlas.tile(slice(5, 7))[1]
+    assert part.shape == (2, len(LIGHTS), 3)
+    arrays: dict[str, Any] = {"value": value.reshape(atlas.value.shape), "sigma": sigma.reshape(atlas.value.shape)}
+    np.savez(tmp_path / "atlas.npz", wi=atlas.wi, wo=atlas.wo, **arrays)
+    how: dict[str, Any] = {"fixed": {"ks": 1.0}, "loss": "gaussian"}
+    one, other = (fit_texture(path, tmp_path / path.stem, **how) for path in (table, tmp_path / "atlas.npz"))
+    np.testing.assert_array_equal(one.fits.values, other.fits.values)
+    np.testing.assert_array_equal(one.fits.sd, other.fits.sd)
+    assert (one.fits.result == "converged").all()
