@@ -24,6 +24,10 @@ class ReadAs(UserWarning):
     """Something was given in another form than the model's; the sentence says in which convention it was read."""
 
 
+class Doubt(UserWarning):
+    """What was read is taken as it is, though it may not be meant; the sentence says what it is."""
+
+
 def exhausted(error: BaseException) -> str:
     """What the machine had too little of, as a sentence; empty where the error is another one.
 

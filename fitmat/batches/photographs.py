@@ -4,6 +4,7 @@ The pictures lie upon each other, pixel by pixel. It finds no light, no normal a
 """
 
 import dataclasses
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,9 @@ import polars as pl
 from jaxtyping import Float
 
 from fitmat.batches.atlas import Atlas, refuse_radians
+from fitmat.batches.doubts import Pictures, doubts
 from fitmat.batches.jobs import read_table
-from fitmat.errors import ReadError
+from fitmat.errors import Doubt, ReadError
 from fitmat.extras import needed
 from fitmat.maths.directions import directions
 from fitmat.measurements.samples import default_channels
@@ -28,8 +30,8 @@ COLUMNS = ("picture", "theta_i", "phi_i", "irradiance")
 CAMERA = ("theta_o", "phi_o")
 """Columns that it may have, 0 if not: where the camera is."""
 
-NOISE = "sigma"
-"""Column that it may have: the standard deviation of the picture's radiances."""
+NOISE, FULL = "sigma", "saturation"
+"""Columns that it may have: the standard deviation of the picture's radiances, and at and above which it has none."""
 
 LAYERS = (("R", "G", "B"), ("Y",))
 """Channels of a picture, in the order of preference."""
@@ -45,10 +47,12 @@ class Stack:
     Attributes:
         pictures: n arrays of radiances as they are in the files, (c, rows, columns).
         factor: What makes radiances values of the BRDF, 1/(E cosθ_i) in sr⁻¹ per unit of radiance, (n,).
+        full: Radiances at and above which the camera shows no more, (n,).
     """
 
     pictures: tuple[np.ndarray, ...]
     factor: Float[np.ndarray, " n"]
+    full: Float[np.ndarray, " n"]
 
     __repr__ = brief
 
@@ -64,9 +68,10 @@ class Stack:
         return np.dtype(float)
 
     def __getitem__(self, part: slice, /) -> Float[np.ndarray, "r w n c"]:
-        """Some of the rows; NaN where a radiance is not finite."""
-        pairs = zip(self.pictures, self.factor, strict=True)
-        found = np.stack([picture[:, part].astype(float) * factor for picture, factor in pairs])
+        """Some of the rows; NaN where a radiance is not finite, or the camera is full."""
+        every = zip((picture[:, part] for picture in self.pictures), self.factor, self.full.tolist(), strict=True)
+        with np.errstate(over="ignore"):  # in the picture's own precision, which full may exceed
+            found = np.stack([np.where(some >= full, np.nan, some.astype(float) * each) for some, each, full in every])
         found[~np.isfinite(found)] = np.nan
         return found.transpose(2, 3, 0, 1)
 
@@ -103,12 +108,16 @@ def read_photographs(table: Path) -> Atlas:
         table: CSV with the columns `picture`, an OpenEXR file relative to the table's folder; `theta_i` and `phi_i`,
             degrees, where its light is, far away, phi from the right side of the picture towards its upper one; and
             `irradiance` E of a surface that faces the light, in radiances of the picture times sr: π L of white that
-            faces it. If need be `theta_o` and `phi_o` of the camera, which is above the sample if not, and `sigma`, the
-            standard deviation of a picture's radiances. Lines that begin with # are comments.
+            faces it. If need be `theta_o` and `phi_o` of the camera, which is above the sample if not; `sigma`, the
+            standard deviation of a picture's radiances; and `saturation`, at and above which they are masked. Lines
+            that begin with # are comments.
 
     Raises:
         FitmatError: the table or a picture cannot be read, a number is not possible, or pictures do not fit together;
             the package OpenEXR is missing.
+
+    Warns:
+        Doubt: lights graze the sample, many radiances are below 0, or a picture looks saturated.
     """
     rows = _rows(table)
     names = rows["picture"].to_list()
@@ -118,8 +127,8 @@ def read_photographs(table: Path) -> Atlas:
         if name in names[:k]:
             got = f"{visible(name)} stands in rows {names.index(name) + 1} and {k + 1}"
             raise ReadError(f"{table}: {got}, expected a picture of its own in each.")
-    of_noise = [NOISE] if NOISE in rows.columns else []
-    told = {name: _numbers(table, rows, name) for name in (*COLUMNS[1:], *CAMERA, *of_noise)}
+    known = [name for name in (NOISE, FULL) if name in rows.columns]
+    told = {name: _numbers(table, rows, name) for name in (*COLUMNS[1:], *CAMERA, *known)}
     _refuse_impossible(table, told)
     if "phi_o" not in rows.columns and told["theta_o"].any():
         raise ReadError(f"{table}: theta_o without phi_o, expected both: where the camera is.")
@@ -130,7 +139,10 @@ def read_photographs(table: Path) -> Atlas:
             raise ReadError(f"{table.parent / name}: {got}: they lie upon each other.")
     factor = 1.0 / (told["irradiance"] * np.cos(np.deg2rad(told["theta_i"])))
     wi, wo = (directions(told[f"theta_{end}"], told[f"phi_{end}"], degrees=True) for end in ("i", "o"))
-    value = Stack(tuple(picture.layers for picture in pictures), factor)
+    layers, full = tuple(picture.layers for picture in pictures), told.get(FULL, np.full(len(rows), np.inf))
+    for words in doubts(Pictures(table, names, layers, full, told["theta_i"])):
+        warnings.warn(words, Doubt, stacklevel=2)
+    value = Stack(layers, factor, full)
     noise = Noise(value.shape, told[NOISE] * factor) if NOISE in told else None
     return Atlas(str(table), value, noise, wi, wo, default_channels(value.shape[-1]))
 
@@ -139,10 +151,11 @@ def _rows(table: Path) -> pl.DataFrame:
     """The table as texts without spaces around them, None where there are none; rows of nothing are left out."""
     found = read_table(table, "lights", f"the columns {', '.join(COLUMNS)}", infer_schema=False)
     names = [name.strip() for name in found.columns]
-    odd = sorted(set(names) - {*COLUMNS, *CAMERA, NOISE})
+    odd = sorted(set(names) - {*COLUMNS, *CAMERA, NOISE, FULL})
     if odd or not set(COLUMNS) <= set(names) or len(set(names)) < len(names):
         got = f"a column {visible(odd[0])!r}" if odd else f"columns {', '.join(map(visible, names))}"
-        raise ReadError(f"{table}: {got}, expected {', '.join(COLUMNS)}, and if need be {', '.join((*CAMERA, NOISE))}.")
+        more = ", ".join((*CAMERA, NOISE, FULL))
+        raise ReadError(f"{table}: {got}, expected {', '.join(COLUMNS)}, and if need be {more}.")
     texts = found.rename(dict(zip(found.columns, names, strict=True))).with_columns(pl.all().str.strip_chars())
     texts = texts.with_columns(pl.all().replace("", None)).filter(~pl.all_horizontal(pl.all().is_null()))
     if not len(texts):
@@ -168,13 +181,9 @@ def _refuse_impossible(table: Path, told: dict[str, np.ndarray]) -> None:
     possible |= {name: np.abs(told[name]) <= 360 for name in ("phi_i", "phi_o")}
     with np.errstate(over="ignore", divide="ignore"):
         possible["irradiance"] = (told["irradiance"] > 0) & np.isfinite(1.0 / told["irradiance"])
-    possible |= {NOISE: told[NOISE] > 0} if NOISE in told else {}
-    expected = {
-        "irradiance": "above 0",
-        NOISE: "above 0",
-        "phi_i": "-360 to 360 degrees",
-        "phi_o": "-360 to 360 degrees",
-    }
+    possible |= {name: told[name] > 0 for name in (NOISE, FULL) if name in told}
+    expected: dict[str, str] = dict.fromkeys(("irradiance", NOISE, FULL), "above 0")
+    expected |= dict.fromkeys(("phi_i", "phi_o"), "-360 to 360 degrees")
     for name, fine in possible.items():
         if not fine.all():
             k = int(np.argmin(fine))

@@ -12,7 +12,7 @@ from typing import IO, Any, NoReturn
 
 import typer
 
-from fitmat.errors import FitmatError, ReadAs
+from fitmat.errors import Doubt, FitmatError, ReadAs
 from fitmat.text import for_shell, visible
 
 WRONG_INPUT, NOT_CONVERGED, NOBODY_READS = 1, 3, 141
@@ -29,7 +29,8 @@ def prepare_streams() -> None:
     _open_what_is_closed()
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
-        warnings.simplefilter("once", ReadAs)
+        for told in (ReadAs, Doubt):
+            warnings.simplefilter("once", told)
         warnings.showwarning = _told
     logging.disable(logging.WARNING)
     for stream in (sys.stdout, sys.stderr):

@@ -1,6 +1,8 @@
 """Photographs: pictures under one light each are fitted as what made them, and wrong tables are one sentence."""
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,7 @@ from typer.testing import CliRunner
 from fitmat.batches.photographs import read_photographs
 from fitmat.batches.textures import fit_texture
 from fitmat.cli.application import app
-from fitmat.errors import FitmatError
+from fitmat.errors import Doubt, FitmatError
 
 ROWS, COLUMNS = 3, 4
 
@@ -144,6 +146,8 @@ NOISY = "picture,theta_i,phi_i,irradiance,sigma\n00.exr,10,0,2,0.1\n01.exr,20,0,
         (NOISY.replace("0.2", ""), "row 2: sigma is nothing, expected a number"),
         (NOISY.replace("0.2", "0"), "row 2: sigma is 0, expected above 0"),
         (NOISY.replace("0.1", "-1"), "row 1: sigma is -1, expected above 0"),
+        (NOISY.replace("sigma", "saturation").replace("0.2", ""), "row 2: saturation is nothing, expected a number"),
+        (NOISY.replace("sigma", "saturation").replace("0.2", "0"), "row 2: saturation is 0, expected above 0"),
         ("picture,theta_i,phi_i,irradiance,theta_o\n00.exr,10,0,2,30\n", "theta_o without phi_o, expected both"),
     ],
 )
@@ -235,3 +239,64 @@ def test_noise_of_pictures_equals_that_of_arrays(table: Path, tmp_path: Path) ->
     np.testing.assert_array_equal(one.fits.values, other.fits.values)
     np.testing.assert_array_equal(one.fits.sd, other.fits.sd)
     assert (one.fits.result == "converged").all()
+
+
+@pytest.mark.parametrize("kind", [np.float16, np.float32, np.uint32])
+def test_what_a_full_camera_shows_is_masked(kind: type, tmp_path: Path) -> None:
+    """At and above the number of the table, as the picture's own kind of numbers has it, channel by channel."""
+    told, full = ([3, 9, 8, 2], 8) if kind is np.uint32 else ([0.3, 0.9, 0.95, 0.1], 0.9)
+    layers = {name: np.full((ROWS, COLUMNS), told[3], kind) for name in "RGB"}
+    layers["G"][0] = np.array(told, kind)
+    draw(tmp_path / "a.exr", layers)
+    draw(tmp_path / "b.exr", layers)
+    lines = ["picture,theta_i,phi_i,irradiance,saturation", f"a.exr,60,0,2,{full}", "b.exr,0,0,2,1e39"]
+    (tmp_path / "lights.csv").write_text("\n".join(lines))
+    value, _ = read_photographs(tmp_path / "lights.csv").tile(slice(0, ROWS * COLUMNS))
+    masked = np.zeros(value[:, 0].shape, bool)
+    masked[1:3, 1] = True
+    np.testing.assert_array_equal(np.isnan(value[:, 0]), masked)
+    assert np.isfinite(value[:, 1]).all()
+    np.testing.assert_allclose(value[0, 0, 1], float(kind(told[0])), rtol=1e-12)  # E cos θ_i = 1
+
+
+def pictures(folder: Path, first: np.ndarray, second: np.ndarray, theta_i: float = 20.0, more: str = "") -> Path:
+    """A table of two grey pictures."""
+    for name, grey in (("a", first), ("b", second)):
+        draw(folder / f"{name}.exr", {"Y": grey.astype(np.float32)})
+    named, cell = (",saturation", f",{more}") if more else ("", "")
+    lines = [f"picture,theta_i,phi_i,irradiance{named}", f"a.exr,10,0,2{cell}", f"b.exr,{theta_i:g},0,2{cell}"]
+    (folder / "lights.csv").write_text("\n".join(lines))
+    return folder / "lights.csv"
+
+
+def test_what_may_not_be_meant_is_said(tmp_path: Path) -> None:
+    """Of 20,000 values 2.5 % below 0; 30 of 10,000 pixels at the top; an error of 0.5° at 85° is tan 85° · 0.5°."""
+    rng = np.random.default_rng(0)
+    a, b = rng.uniform(0.1, 1.0, (2, 100, 100))
+    read_photographs(pictures(tmp_path, a, b, 80.0))  # without a word
+    dark, bright = b.copy(), a.copy()
+    dark[:5], bright[0, :30] = -0.01, 2.0
+    with pytest.warns(Doubt) as said:
+        atlas = read_photographs(pictures(tmp_path, bright, dark, 85.0))
+    grazing, negative, full = (str(one.message).removeprefix(f"{tmp_path / 'lights.csv'}: ") for one in said)
+    assert grazing.startswith("1 of 2 lights beyond 80°: values are divided by cos θ_i, and at 85° (b.exr) an error of")
+    assert f"is one of {100.0 * np.tan(np.deg2rad(85.0)) * np.deg2rad(0.5):.2g} %" in grazing
+    assert negative.startswith("2.5 % of the radiances are below 0, most of them in b.exr: they stay")
+    assert full.startswith("a.exr looks saturated: 0.3 % of its pixels have the largest value, 2. Say in a column")
+    value, _ = atlas.tile(slice(0, 10000))
+    assert np.isfinite(value).all()
+    assert (value[:500, 1] < 0.0).all()
+    value, _ = read_photographs(pictures(tmp_path, bright, b, more="2")).tile(slice(0, 10000))  # without a word
+    assert np.isnan(value[:30, 0]).all()
+    assert np.isfinite(value[30:, 0]).all()
+
+
+def test_the_command_says_what_may_not_be_meant(tmp_path: Path) -> None:
+    """In lines of their own, before the points are fitted, for which two pictures are too few."""
+    grey = np.full((5, 5), 0.3)
+    words = ["batch", "--lights", str(pictures(tmp_path, grey, grey, 85.0)), "--out", str(tmp_path / "out")]
+    command = [sys.executable, "-m", "fitmat", *words, "--models", "lambert", "--fix", "kd=0.5"]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    said = [line.partition(": ")[2] for line in ended.stderr.splitlines() if line.startswith(str(tmp_path))]
+    assert [line[:13] for line in said] == ["1 of 2 lights", "a.exr and 1 m"]
+    assert "a.exr and 1 more look saturated: 100 % of its pixels" in said[1]

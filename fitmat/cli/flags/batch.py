@@ -36,7 +36,8 @@ LightsFlag = Annotated[
     typer.Option(
         help="Pictures of a flat sample under one light each, as a texture: CSV with columns picture (OpenEXR), "
         "theta_i, phi_i (degrees) and irradiance, in radiances × sr; theta_o and phi_o where the camera is not above; "
-        "sigma, the standard deviation of a picture's radiances, where it is known.",
+        "sigma, the standard deviation of a picture's radiances, where it is known; saturation, from which radiance on "
+        "the camera is full.",
         metavar="FILE",
         show_default=False,
     ),
