@@ -59,6 +59,9 @@ BROKEN: dict[str, str | bytes] = {
 }
 """Content of files that cannot be fitted, each in its own way."""
 
+APART_FROM = ("message", "seconds")
+"""Columns in which two runs of the same files may differ."""
+
 ALONE = 5
 """Files of which the rows of a study by itself are compared with those of the batch, number by number."""
 
@@ -140,7 +143,8 @@ def refuse_other_than_alone(every: list[Path], table: pl.DataFrame) -> None:
     for path in fitted[:: max(1, len(fitted) // ALONE)]:
         alone = workers.studied(Job(path, {}, told), digest(path))
         for row, found in zip(alone, table.filter(pl.col("file") == str(path)).iter_rows(named=True), strict=True):
-            differ = [name for name, cell in row.items() if name in found and found[name] != cell and cell is not None]
+            told = {name: cell for name, cell in row.items() if name in found and name != "seconds"}
+            differ = [name for name, cell in told.items() if found[name] != cell and cell is not None]
             if differ:
                 raise SystemExit(
                     f"{path.name}, {row['model']}: {', '.join(differ)} differ from those of a study alone."
@@ -166,7 +170,7 @@ def main() -> None:
         tables = [found.table for found in taken.values()]
         for table in tables:
             refuse_other_than(count - broken, broken, table)
-            if not tables[0].drop("message").equals(table.drop("message")):
+            if not tables[0].drop(APART_FROM).equals(table.drop(APART_FROM)):
                 raise SystemExit("another number of workers makes another table.")
         refuse_other_than_alone(every, tables[0])
     rows = [

@@ -392,7 +392,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             "processes": without((0, *WHOLE), NOTHING),
             "scheduler": TEXT,
             "pool": POOLS,
-            "force": FLAG,
+            **dict.fromkeys(("runs", "force"), FLAG),
             "progress": CALLED,
         },
     ),

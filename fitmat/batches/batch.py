@@ -18,6 +18,7 @@ from fitmat._types import Progress
 from fitmat.batches import cluster, pools, record, rows, workers
 from fitmat.batches.jobs import Job, digest, every_file, from_table
 from fitmat.batches.record import PARTS, Claim
+from fitmat.batches.runs import RUN, RUNS, is_there, link
 from fitmat.errors import FitmatError, OutputError
 from fitmat.fitting.pooling import Pooled, asked
 from fitmat.reports import summary
@@ -73,6 +74,7 @@ def batch(
     processes: int | None = None,
     scheduler: str | None = None,
     pool: str | Sequence[str] | None = None,
+    runs: bool = False,
     force: bool = False,
     progress: Progress | None = None,
 ) -> Batch:
@@ -91,6 +93,7 @@ def batch(
         pool: Parameters in which the files are taken to be of one kind, as the index of one lacquer: each is drawn to
             the others as far as its own data leave it open. They are columns NAME_pooled of the table beside the
             others; what was fitted stays.
+        runs: Whether each file leaves a run of its own too, with its page, in the folder `runs`; slower.
         force: Replace the results in the folder though some are of files, or of arguments, that are not given now.
         progress: Called with what is done next.
 
@@ -108,15 +111,16 @@ def batch(
     arguments.kind("folder", folder, str, os.PathLike)
     arguments.whole("processes", processes, 1, optional=True)
     arguments.kind("scheduler", scheduler, str, optional=True)
-    arguments.flags(force=force)
+    arguments.flags(runs=runs, force=force)
     arguments.function("progress", progress)
     arguments.named(reading=reading, studying=studying)
     if not wants_all(models):
         named(models)
     told = {"sampling": False} | dict(studying or {}) | {"models": models}
-    names, listed = asked(pool), _jobs(sources, jobs, dict(reading or {}), told)
+    target, names, listed = Path(folder), asked(pool), _jobs(sources, jobs, dict(reading or {}), told)
     pools.refuse_idle(names, listed, told)
-    target = Path(folder)
+    if runs:
+        listed = [dataclasses.replace(job, runs=target / RUNS) for job in listed]
     if scheduler is not None and processes is not None:
         arguments.refuse("processes", processes, "None with a scheduler, whose workers are as many as they are")
     with files.alone(target):
@@ -183,11 +187,17 @@ def _studied(every: Sequence[Job], claim: Claim, do: Do, names: Sequence[str], s
     table = _table(every, whole)
     memory = io.BytesIO()
     table.write_parquet(memory)
-    claim.renew((TABLE, PAGE), [f"{key}.json" for key in keys])
+    claim.renew((TABLE, PAGE), [f"{key}.json" for key in keys], _of_runs(every, whole))
     file = files.write_bytes(target / TABLE, memory.getvalue())
     files.write_text(target / PAGE, _page(every, whole, told))
     before = sum(len(keys[key]) for key in earlier)
     return Batch(file, table, {"fitted": len(every) - lost, "refused": lost, "earlier": before}, told)
+
+
+def _of_runs(every: Sequence[Job], done: pools.Done) -> list[str] | None:
+    """Names of the runs; None where none was asked for."""
+    asked_for = any(job.runs is not None for job in every)
+    return sorted({str(found[0][RUN]) for found in done.values() if found[0].get(RUN)}) if asked_for else None
 
 
 def _of_file(file: str, message: str) -> str:
@@ -211,7 +221,13 @@ def _best(job: Job, found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "misfit": row.get("misfit_over_noise"),
     }
     said = {name: row.get(name, "") for name in rows.CARDS}
-    return {"name": job.path.name, "swatch": row.get(rows.SWATCH)} | said | levels | numbers
+    told = {"name": job.path.name, "swatch": row.get(rows.SWATCH), "link": link(row)}
+    return told | said | levels | numbers | {"columns": _numbers(row)}
+
+
+def _numbers(row: Mapping[str, Any]) -> dict[str, float]:
+    """What of a row can be drawn."""
+    return {name: cell for name, cell in row.items() if isinstance(cell, float | int) and not isinstance(cell, bool)}
 
 
 def _lost(found: Sequence[Mapping[str, Any]]) -> bool:
@@ -222,14 +238,15 @@ def _tell(say: Progress, done: Mapping[int, Any], lost: int, total: int) -> None
     say(f"fitting {total} files{f', {lost} refused' if lost else ''}", len(done), total)
 
 
-def _kept(target: Path, waiting: Mapping[str, Any]) -> Iterator[tuple[str, list[dict[str, Any]]]]:
-    """Rows that an earlier run left, by key; one that cannot be read is done again."""
-    for key in waiting:
+def _kept(target: Path, waiting: Waiting) -> Iterator[tuple[str, list[dict[str, Any]]]]:
+    """Rows that an earlier run left, by key; what cannot be read, or lacks a run that is asked for, is done again."""
+    for key, (job, _) in waiting.items():
         try:
             found = json.loads((target / PARTS / f"{key}.json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
             continue
-        if isinstance(found, list) and found and all(isinstance(row, dict) and "outcome" in row for row in found):
+        sound = isinstance(found, list) and found and all(isinstance(row, dict) and "outcome" in row for row in found)
+        if sound and is_there(job, found):
             yield key, found
 
 

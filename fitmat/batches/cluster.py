@@ -46,7 +46,8 @@ def each(jobs: Mapping[str, tuple[Job, str]], address: str, work: Work = studied
         _refuse_unfit(client)
         keys = {}
         for key, (job, content) in jobs.items():
-            absolute = dataclasses.replace(job, path=job.path.absolute())
+            runs = None if job.runs is None else job.runs.absolute()
+            absolute = dataclasses.replace(job, path=job.path.absolute(), runs=runs)
             keys[client.submit(there, HERE, work, absolute, content, key=f"fitmat-{key}")] = key
         for done in distributed.as_completed(list(keys), loop=client.loop):
             if done.status not in ("finished", "error"):

@@ -45,11 +45,13 @@ class Job:
         path: The file.
         reading: Arguments of `fitmat.read`.
         studying: Arguments of `fitmat.study`.
+        runs: Folder in which it leaves a run of its own; None where none is asked for.
     """
 
     path: Path
     reading: Mapping[str, Any]
     studying: Mapping[str, Any]
+    runs: Path | None = None
 
     def key(self, content: str) -> str:
         """The name under which the rows are kept: of what is read, how, and by which fitmat.
@@ -57,10 +59,8 @@ class Job:
         Args:
             content: `digest` of the file.
         """
-        told = json.dumps(
-            [self.path.name, self.reading, self.studying, version("fitmat"), content], sort_keys=True, default=str
-        )
-        return hashlib.sha256(told.encode()).hexdigest()[:32]
+        told = [self.path.name, self.reading, self.studying, version("fitmat"), content, self.runs is not None]
+        return hashlib.sha256(json.dumps(told, sort_keys=True, default=str).encode()).hexdigest()[:32]
 
 
 def digest(path: Path) -> str:

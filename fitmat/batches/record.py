@@ -8,11 +8,12 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from fitmat import files
+from fitmat.batches import runs
 from fitmat.errors import OutputError
 from fitmat.studies.result import BATCH
 from fitmat.text import visible
@@ -29,11 +30,13 @@ class Record:
         of: What was fitted → how, or what it was, as a digest.
         files: Names of the results.
         parts: Names of what they are made of, in `PARTS`.
+        runs: Names of runs, in `runs.RUNS`.
     """
 
     of: Mapping[str, str]
     files: Sequence[str]
     parts: Sequence[str]
+    runs: Sequence[str] = ()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,22 +53,27 @@ class Claim:
     before: Record
     of: Mapping[str, str]
 
-    def renew(self, names: Sequence[str], parts: Sequence[str]) -> None:
+    def renew(self, names: Sequence[str], parts: Sequence[str], of_runs: Sequence[str] | None = None) -> None:
         """Write the record, before the results; of something else, what nothing replaces is removed.
 
         Args:
             names: Of the results.
             parts: Of what they are made of.
+            of_runs: Names of runs; None where none was asked for: then those of the same files stay.
 
         Raises:
             OutputError: something cannot be written or removed.
         """
-        if _lost(self.before, self.of):
+        other = _lost(self.before, self.of)
+        kept = of_runs if of_runs is not None else () if other else self.before.runs
+        for name in set(self.before.runs) - set(kept):
+            _remove(self.folder / runs.RUNS / name, runs.remove)
+        if other:
             for name in set(self.before.files) - set(names):
                 _remove(self.folder / name)
             for name in set(self.before.parts) - set(parts):
                 _remove(self.folder / PARTS / name)
-        after = dataclasses.asdict(Record(self.of, names, parts))
+        after = dataclasses.asdict(Record(self.of, names, parts, kept))
         files.write_text(self.folder / BATCH, json.dumps(after))
 
 
@@ -102,8 +110,8 @@ def _earlier(folder: Path) -> Record:
     """What a batch left; an empty record where none did."""
     try:
         found = json.loads((folder / BATCH).read_text(encoding="utf-8"))
-        names, parts = ([name for name in found[key] if Path(name).name == name] for key in ("files", "parts"))
-        return Record(dict(found["of"]), names, parts)
+        known = ([name for name in found.get(key, ()) if Path(name).name == name] for key in ("files", "parts", "runs"))
+        return Record(dict(found["of"]), *known)
     except FileNotFoundError:
         return Record({}, (), ())
     except (OSError, ValueError, LookupError, TypeError) as error:
@@ -116,10 +124,10 @@ def _lost(before: Record, of: Mapping[str, str]) -> list[str]:
     return [name for name, how in before.of.items() if of.get(name) != how]
 
 
-def _remove(path: Path) -> None:
+def _remove(path: Path, of_folder: Callable[[Path], None] = shutil.rmtree) -> None:
     try:
         if path.is_dir():
-            shutil.rmtree(path)
+            of_folder(path)
         else:
             path.unlink(missing_ok=True)
     except OSError as error:

@@ -8,6 +8,7 @@ import multiprocessing
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -15,9 +16,9 @@ from typing import Any
 
 import jax
 
-from fitmat.batches import rows
+from fitmat.batches import rows, runs
 from fitmat.batches.jobs import Job, digest
-from fitmat.errors import FitmatError, ReadError
+from fitmat.errors import FitmatError, OutputError, ReadError
 from fitmat.measurements.reader import read
 from fitmat.measurements.samples import Measurements
 from fitmat.studies.study import study
@@ -35,7 +36,7 @@ Work = Callable[[Job, str], Rows]
 
 
 def studied(job: Job, content: str) -> Rows:
-    """The rows of one file; a file that cannot be used is a row that says why.
+    """The rows of one file, with the seconds that it took; a file that cannot be used is a row that says why.
 
     What is read of a file that changes meanwhile says nothing of it: its row is one that is not kept.
 
@@ -43,8 +44,19 @@ def studied(job: Job, content: str) -> Rows:
         job: The file and what is told of it.
         content: Digest of what is to be read.
     """
+    begin = time.perf_counter()
+    found = _rows(job, content)
+    taken = round(time.perf_counter() - begin, 3)
+    return [{**row, "seconds": taken} for row in found]
+
+
+def _rows(job: Job, content: str) -> Rows:
     try:
-        return rows.rows(study(_read(job, content), **{"short": True, **job.studying}))
+        found = study(_read(job, content), **{"short": job.runs is None, **job.studying})
+        told = rows.rows(found)
+        return told if job.runs is None else runs.write(job, job.key(content), found, told)
+    except OutputError as error:
+        return [{"outcome": rows.FAILED, "message": str(error)}]
     except _ChangedError:
         words = f"{job.path} changed while it waited. Give the same command again."
         return [{"outcome": rows.FAILED, "message": words}]

@@ -49,7 +49,7 @@ def run(
         reading: Arguments of `fitmat.read`.
         studying: Arguments of `fitmat.study`, models included.
         doing: How many processes work side by side, or the scheduler of a cluster; the device; what to pool; whether
-            to replace results of something else.
+            each file leaves a run too, and whether to replace results of something else.
 
     Raises:
         FitmatError: as `batch`, or the device is no CPU.

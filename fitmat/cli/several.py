@@ -19,6 +19,7 @@ from fitmat.cli.flags.batch import (
     PoolFlag,
     ProcessesFlag,
     ReplaceBatchFlag,
+    RunsFlag,
     SchedulerFlag,
     SourcesFlag,
 )
@@ -88,6 +89,7 @@ def batch(
     scheduler: SchedulerFlag = None,
     device: DeviceFlag = "cpu",
     pool: PoolFlag = None,
+    runs: RunsFlag = False,
     mcmc: McmcFlag = False,
     seed: SeedFlag = 0,
     fix: FixFlag = None,
@@ -108,10 +110,11 @@ def batch(
     told |= {"dispersion": dispersion, "film": film, "sampling": mcmc} | fit.known(fix or [], prior or [])
     read = reading | {"instrument": instrument}
     if lights is not None or batch.is_texture(files or []):
-        idle = {"jobs": jobs, "scheduler": scheduler, "pool": pool}
+        idle = {"jobs": jobs, "scheduler": scheduler, "pool": pool, "runs": runs}
         doing = {"threads": processes, "device": device, "force": force}
         return batch.texture(batch.alone(lights, files or []), out, idle, read, told, doing)
-    doing = {"processes": processes, "scheduler": scheduler, "device": device, "pool": pool, "force": force}
+    doing = {"processes": processes, "scheduler": scheduler, "device": device, "pool": pool}
+    doing |= {"runs": runs, "force": force}
     found = batch.run(files or [], out, jobs, read, told, doing)
     batch.show(found)
     if found.counts["refused"]:

@@ -31,8 +31,11 @@ from fitmat.studies.citations import bibtex
 from fitmat.text import visible_in
 from fitmat.uncertainty.diagnostics import ENOUGH_ESS, ENOUGH_TAIL_ESS, ENOUGH_TAU, GOOD_RHAT, VERDICTS
 
+CHARTS, CHART_STYLES = "uplot/uPlot.iife.min.js", "uplot/uPlot.min.css"
+"""The chart library."""
+
 SCRIPTS = (
-    "uplot/uPlot.iife.min.js",
+    CHARTS,
     "core.js",
     "charts.js",
     "curves.js",
@@ -43,7 +46,7 @@ SCRIPTS = (
 )
 """What a page runs, in this order: the chart library, then ours."""
 
-STYLES = ("uplot/uPlot.min.css", "page.css", "ball.css")
+STYLES = (CHART_STYLES, "page.css", "ball.css")
 
 LICENCE = "uplot/LICENSE"
 """Of the chart library, which each page holds."""
@@ -85,7 +88,7 @@ def to_html(record: Mapping[str, Any], figures: Mapping[str, Any]) -> str:
             scripts=[Markup(script) for script in scripts],
             styles=[Markup(static(name)) for name in STYLES],
             licence=Markup(static(LICENCE)),
-            data=Markup(_embedded({"record": _rounded(_used(told)), "figures": drawn})),
+            data=Markup(embedded({"record": _rounded(_used(told)), "figures": drawn})),
             swatch=figures["swatches"],
             **_WORDS,
         )
@@ -166,7 +169,7 @@ def digest(script: str) -> str:
     return base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
 
-def _embedded(thing: Any) -> str:
+def embedded(thing: Any) -> str:
     """JSON that ends no script and begins no tag."""
     text = json.dumps(thing, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")

@@ -74,7 +74,7 @@ def test_a_cluster_that_loses_a_worker_finds_what_this_process_finds(
     monkeypatch.setattr(workers, "each", one_by_one)
     here = fm.batch(scans, tmp_path / "here", "lambert")
     assert found.counts == {"fitted": 5, "refused": 1, "earlier": 0}
-    assert found.table.equals(here.table)
+    assert found.table.drop("seconds").equals(here.table.drop("seconds"))
     again = fm.batch(scans, tmp_path / "cluster", "lambert")
     assert again.counts["earlier"] == 6
 

@@ -72,6 +72,10 @@ DeviceFlag = Annotated[
     Literal["cpu", "gpu"], typer.Option(help="Where the points of a texture are fitted; files always on the CPU.")
 ]
 
+RunsFlag = Annotated[
+    bool, typer.Option("--runs", help="Leave of each file what fit leaves too, its page among it, in runs/; slower.")
+]
+
 McmcFlag = Annotated[
     bool, typer.Option("--mcmc", help="Sample every posterior; slower, else intervals from Laplace's approximation.")
 ]

@@ -27,5 +27,6 @@
     const wanted = filter.value.trim().toLowerCase().split(/\s+/);
     for (const row of rows) row.hidden = !wanted.every((word) => row.textContent.toLowerCase().includes(word));
     count.textContent = `${rows.filter((row) => !row.hidden).length} of ${rows.length} shown`;
+    table.dispatchEvent(new Event("shown"));
   });
 })();
