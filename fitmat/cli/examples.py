@@ -45,7 +45,7 @@ DESIGN = (
 
 BATCH = (
     "Written to --out: index.html, a line for each file; results.parquet, one row for each file and model with every "
-    "parameter, its interval, the doubts, the match and the seconds that the file took. A file that cannot be used is a "
+    "parameter, its interval, the doubts, the match and the seconds it took. A file that cannot be used is a "
     "row with its sentence. Interrupted or killed, the same command goes on; a file that changed is done again.\n\n"
     "One .npz file or Zarr group (.zarr) with an array value (rows, columns, samples, channels) or (points, samples, "
     "channels) is a texture: its directions are wi and wo, or theta_i, theta_o, phi_i, phi_o in degrees, the same at "
