@@ -6,6 +6,7 @@ Nothing is computed here, and no result is shown.
 import contextlib
 import signal
 import sys
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import FrameType
@@ -27,12 +28,16 @@ if TYPE_CHECKING:
 LOADING = "loading"
 """What is done before the first stage."""
 
+EVERY = 30.0
+"""Seconds after which a stage that goes on says how far it is where there is no terminal, as in the log of a queue."""
+
 
 class Watch:
     """What a run tells of its progress on stderr; while it samples, Ctrl-C asks it to stop.
 
-    At a terminal it is one line with a bar, elsewhere a line for each stage. The first Ctrl-C during sampling is raised
-    as KeyboardInterrupt at the next step, so that what was done is kept; a second one, and any other, is as before.
+    At a terminal it is one line with a bar, elsewhere a line for each stage, and now and then how far a long one is.
+    Words behind a comma are news of the same stage. The first Ctrl-C during sampling is raised as KeyboardInterrupt at
+    the next step, so that what was done is kept; a second one, and any other, is as before.
 
     Attributes:
         done: How far the stage is.
@@ -40,6 +45,7 @@ class Watch:
 
     def __init__(self, screen: Console) -> None:
         self._screen, self._stage, self._told = screen, "", set()
+        self._since, self._said = (0.0, 0), 0.0
         self._bar: Progress | None = None
         self._task = TaskID(0)
         self._before: Any = None
@@ -67,6 +73,8 @@ class Watch:
             self._begin(what, sampling)
         if self._bar is not None:
             self._bar.update(self._task, completed=done, total=total or None)
+        elif total and time.monotonic() - self._said > EVERY:
+            self._tell_how_far(done, total)
         if sampling and self._asked:
             raise KeyboardInterrupt
 
@@ -87,8 +95,13 @@ class Watch:
             self._say(words)
 
     def _begin(self, what: str, sampling: bool) -> None:
+        goes_on = what.partition(",")[0] == self._stage.partition(",")[0]
         self._stage = what
-        if self._bar is not None:
+        if not goes_on:
+            self._since = time.monotonic(), self.done
+        if self._bar is not None and goes_on:
+            self._bar.update(self._task, description=what, refresh=True)
+        elif self._bar is not None:
             self._bar.remove_task(self._task)
             self._task = self._bar.add_task(what, total=None)
             self._bar.refresh()
@@ -99,7 +112,14 @@ class Watch:
         elif not sampling:
             self._give_back()
 
+    def _tell_how_far(self, done: int, total: int) -> None:
+        """Say it with the time that is left, if what was done since the stage began tells of it."""
+        now, (begin, before) = time.monotonic(), self._since
+        left = (now - begin) / (done - before) * (total - done) if done > before else None
+        self._say(f"{done:,} of {total:,}{'' if left is None else f', about {_spoken(left)} left'}.")
+
     def _say(self, words: str) -> None:
+        self._said = time.monotonic()
         if self._bar is not None:
             self._screen.print(visible(words), highlight=False, markup=False, soft_wrap=True)
         else:
@@ -121,6 +141,16 @@ class Watch:
         if self._bar is not None:
             self._bar.stop()
             self._bar = None
+
+
+def _spoken(seconds: float) -> str:
+    return (
+        f"{seconds:.0f} s"
+        if seconds < 100
+        else f"{seconds / 60:.0f} min"
+        if seconds < 6000
+        else f"{seconds / 3600:.0f} h"
+    )
 
 
 @contextlib.contextmanager

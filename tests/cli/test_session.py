@@ -162,3 +162,39 @@ def test_the_line_at_a_terminal_is_never_blank():
         words in shown
         for words in ("loading", "fitting ggx", "compiling ggx, once for this machine", "loading ggx", "sampling ggx")
     )
+
+
+def test_a_long_stage_says_how_far_it_is_where_there_is_no_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every half minute, with the time left at the speed since the stage began; news of it do not begin it anew."""
+    now = [100.0]
+    monkeypatch.setattr(session.time, "monotonic", lambda: now[0])
+    written = io.StringIO()
+    watch = session.Watch(Console(file=written))
+    watch("fitting 1000 files", 200, 1000)
+    for done, words in ((210, ""), (240, ""), (250, ", 1 refused"), (290, ", 1 refused"), (320, ", 1 refused")):
+        now[0] += 16.0
+        watch(f"fitting 1000 files{words}", done, 1000)
+    assert written.getvalue().splitlines() == [
+        "Fitting 1000 files.",
+        "240 of 1,000, about 10 min left.",
+        "Fitting 1000 files, 1 refused.",
+        "320 of 1,000, about 8 min left.",
+    ]
+    now[0] += 100.0
+    watch("weighing the models", 0, 0)
+    assert written.getvalue().splitlines()[4:] == ["Weighing the models."]
+
+
+def test_at_a_terminal_news_of_a_stage_keep_its_bar() -> None:
+    written = io.StringIO()
+    watch = session.Watch(Console(file=written, force_terminal=True, width=100))
+    watch.open("loading")
+    watch("fitting 4 files", 1, 4)
+    assert watch._bar is not None
+    first = watch._bar.tasks[0]
+    watch("fitting 4 files, 1 refused", 2, 4)
+    assert watch._bar.tasks == [first]
+    assert (first.description, first.completed) == ("fitting 4 files, 1 refused", 2)
+    watch("weighing the models", 0, 0)
+    assert watch._bar.tasks[0] is not first
+    watch.close()
