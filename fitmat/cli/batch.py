@@ -25,8 +25,11 @@ from fitmat.errors import FitmatError
 from fitmat.studies import DEFAULT_MODELS
 from fitmat.text import visible
 
-TEXTURE = ("models", "loss", "masking", "fixed", "seed", "constants")
-"""Of what the flags say, what a texture takes; without draws the seed is of no consequence."""
+TEXTURE = {
+    *("files", "lights", "out", "force", "processes", "device"),
+    *("models", "loss", "masking", "fix", "seed"),
+}
+"""Parameters of the command that a texture takes; without draws the seed is of no consequence."""
 
 MOST = 20
 """Rows that are shown; the table has all."""
@@ -97,8 +100,7 @@ def alone(lights: Path | None, sources: Sequence[Path]) -> Path:
 def texture(
     source: Path,
     folder: Path,
-    idle: Mapping[str, Any],
-    reading: Mapping[str, Any],
+    typed: Mapping[str, str],
     studying: Mapping[str, Any],
     doing: Mapping[str, Any],
 ) -> None:
@@ -107,8 +109,7 @@ def texture(
     Args:
         source: The atlas, or a table of lights.
         folder: Where to.
-        idle: Other flags, all of no use here, which are refused.
-        reading: Arguments of `fitmat.read`.
+        typed: Parameters that stand on the command line → their flags; those that are of no use here are refused.
         studying: Arguments of `fitmat.study`, of which a texture takes some.
         doing: How many threads work side by side, on which device, and whether to replace results of something else.
 
@@ -116,12 +117,8 @@ def texture(
         FitmatError: as `fit_texture`, a flag is of no use to a texture, or there is no such device.
         SystemExit: it was interrupted.
     """
-    said = {**idle, **reading, **reading["constants"], **studying, "instrument": not reading["instrument"].ideal}
-    refused = [
-        name for name, given in said.items() if name not in (*TEXTURE, "constants") and given not in (None, False, {})
-    ]
-    if refused:
-        raise FitmatError(f"{source} is a texture, for which {refused[0]} means nothing: expected no flag for it.")
+    if idle := [flag for name, flag in typed.items() if name not in TEXTURE]:
+        raise FitmatError(f"{source} is a texture, for which {idle[0]} means nothing: leave it out.")
     models = studying["models"]
     model = DEFAULT_MODELS[-1] if models == MODELS else models
     if "," in model:

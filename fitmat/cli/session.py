@@ -40,7 +40,7 @@ class Watch:
     the next step, so that what was done is kept; a second one, and any other, is as before.
 
     Attributes:
-        done: How far the stage is.
+        done: The most that was done of a stage.
     """
 
     def __init__(self, screen: Console) -> None:
@@ -66,7 +66,7 @@ class Watch:
 
     def __call__(self, what: str, done: int, total: int) -> None:
         """Show the stage; stop where that was asked for."""
-        self.done = done
+        self.done = max(self.done, done)
         what = visible(what)
         sampling = what.startswith(SAMPLING)
         if what != self._stage:

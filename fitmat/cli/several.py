@@ -37,7 +37,7 @@ from fitmat.cli.flags.fitting import (
     SeedFlag,
     TiltFlag,
 )
-from fitmat.cli.flags.given import Command
+from fitmat.cli.flags.given import Command, typed
 from fitmat.cli.flags.groups import takes
 from fitmat.cli.flags.instrument import instrument
 from fitmat.cli.flags.labs import LaboratoriesFlag, SurfaceFlag
@@ -78,6 +78,7 @@ def labs(
 )
 @takes(reading, instrument)
 def batch(
+    context: typer.Context,
     reading: dict[str, Any],
     instrument: Any,
     files: SourcesFlag = None,
@@ -110,9 +111,8 @@ def batch(
     told |= {"dispersion": dispersion, "film": film, "sampling": mcmc} | fit.known(fix or [], prior or [])
     read = reading | {"instrument": instrument}
     if lights is not None or batch.is_texture(files or []):
-        idle = {"jobs": jobs, "scheduler": scheduler, "pool": pool, "runs": runs}
         doing = {"threads": processes, "device": device, "force": force}
-        return batch.texture(batch.alone(lights, files or []), out, idle, read, told, doing)
+        return batch.texture(batch.alone(lights, files or []), out, typed(context), told, doing)
     doing = {"processes": processes, "scheduler": scheduler, "device": device, "pool": pool}
     doing |= {"runs": runs, "force": force}
     found = batch.run(files or [], out, jobs, read, told, doing)

@@ -178,7 +178,8 @@ def test_wrong_tables_are_one_sentence(content: str, message: str, table: Path, 
     [
         (["{folder}/x.csv", "--lights", "{folder}/lights.csv"], "expected one of them: the table names its pictures"),
         (["--lights", "{folder}/lights.txt"], "whose name ends in .csv"),
-        (["--lights", "{folder}/lights.csv", "--jobs", "{folder}/x.csv"], "for which jobs means nothing"),
+        (["--lights", "{folder}/lights.csv", "--loss", "gaussian"], "the loss gaussian (--loss) needs it"),
+        (["--lights", "{folder}/lights.csv", "--jobs", "{folder}/x.csv"], "for which --jobs means nothing"),
     ],
 )
 def test_what_means_nothing_beside_lights_is_refused(words: list[str], message: str, table: Path) -> None:

@@ -415,10 +415,15 @@ def test_the_command_fits_a_texture(atlas: Path, tmp_path: Path) -> None:
     ("words", "message"),
     [
         (["--models", "lambert,ggx"], "expected one: every point has the same model"),
-        (["--tilt"], "is a texture, for which tilt means nothing"),
-        (["--mcmc"], "is a texture, for which sampling means nothing"),
-        (["--scheduler", "tcp://10.0.0.1:8786"], "is a texture, for which scheduler means nothing"),
-        (["--theta-i", "30"], "is a texture, for which theta_i means nothing"),
+        (["--tilt"], "is a texture, for which --tilt means nothing: leave it out."),
+        (["--mcmc"], "is a texture, for which --mcmc means nothing"),
+        (["--prior", "eta=1.5,0.1"], "is a texture, for which --prior means nothing"),
+        (["--angle-error", "0.1"], "is a texture, for which --angle-error means nothing"),
+        (["--scheduler", "tcp://10.0.0.1:8786"], "is a texture, for which --scheduler means nothing"),
+        (["--theta-i", "30"], "is a texture, for which --theta-i means nothing"),
+        (["--loss", "gaussian-inferred"], "loss is 'gaussian-inferred' (--loss), expected one that infers no noise"),
+        (["--models", "ggx-film"], "to = 'ggx-film' (--models), expected a model"),
+        (["--models", "lambert", "--fix", "kd=0.5"], "every parameter of lambert is fixed (--fix), expected one that"),
     ],
 )
 def test_what_means_nothing_for_a_texture_is_refused(words, message, atlas: Path, tmp_path: Path) -> None:

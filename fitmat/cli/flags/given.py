@@ -27,8 +27,7 @@ class Command(TyperCommand):
             return TyperCommand.parse_args(self, ctx, args)
         _refuse_repeated(ctx, self.make_parser(ctx).parse_args(args=list(args))[-1])
         left = TyperCommand.parse_args(self, ctx, args)
-        flags = {p.name: p.opts[0] if p.param_type_name == "option" else p.opts[0].upper() for p in self.params}
-        given = [name for name in flags if ctx.get_parameter_source(name).name == "COMMANDLINE"]
+        flags, given = _flags(ctx), typed(ctx)
         _refuse_unjoined(ctx)
         for name, other in NEEDS.get(self.name or "", {}).items():
             if name in given and other not in given:
@@ -38,6 +37,15 @@ class Command(TyperCommand):
             if name in given and others:
                 ctx.fail(f"{', '.join(others)} would change nothing beside {flags[name]}. Leave one or the other out.")
         return left
+
+
+def typed(ctx: Any) -> dict[str, str]:
+    """What stands on the command line: names of parameters → their flags."""
+    return {name: flag for name, flag in _flags(ctx).items() if ctx.get_parameter_source(name).name == "COMMANDLINE"}
+
+
+def _flags(ctx: Any) -> dict[str, str]:
+    return {p.name: p.opts[0] if p.param_type_name == "option" else p.opts[0].upper() for p in ctx.command.params}
 
 
 def _refuse_unjoined(ctx: Any) -> None:

@@ -98,7 +98,7 @@ def fit_many(
     shared, held = shared_by_all(pair, numbers.shape[-1], to, fixed or {}, find_loss(loss), masking)
     if noise is None and shared.loss.needs_noise:
         raise FitmatError(
-            f"sigma is None, expected the noise: the loss {shared.loss.name} needs it. Give it, or another."
+            f"sigma is None, expected the noise: the loss {shared.loss.name} (--loss) needs it. Give it, or another."
         )
     _refuse_idle(names, shared, held, int(np.prod(numbers.shape[:-2])))
     axes, flat = numbers.shape[:-2], numbers.reshape(-1, *numbers.shape[-2:])
@@ -182,14 +182,20 @@ def shared_by_all(
         FitmatError: the model is unknown or has other channels, or nothing is left to fit.
     """
     if loss.infers_noise:
-        raise ModelError(f"loss is {loss.name!r}, expected one that infers no noise: many fits look at no neighbours.")
+        raise ModelError(
+            f"loss is {loss.name!r} (--loss), expected one that infers no noise: many fits look at no neighbours."
+        )
     template = asked_model(to, channels, masking)
     if isinstance(to, str) and has_film(template):
-        raise ModelError(f"to = {to!r}, expected a model: a film has wavelengths. Give model({to!r}, wavelengths=[…]).")
+        raise ModelError(
+            f"to = {to!r} (--models), expected a model: a film has wavelengths. Give model({to!r}, wavelengths=[…])."
+        )
     held = held_values(template, names.own(template.name, {e.name for e in entries(template)}, fixed))
     moved = coordinates(template, held)
     if not moved.count:
-        raise ModelError(f"every parameter of {template.name} is fixed, expected one that is not: nothing is fitted.")
+        raise ModelError(
+            f"every parameter of {template.name} is fixed (--fix), expected one that is not: nothing is fitted."
+        )
     template = with_vector(template, holding(template, held))
     shown = at(template, *(w[:1] for w in pair)).shape[1]
     if shown not in (1, channels):
