@@ -3,8 +3,12 @@
 The pictures lie upon each other, pixel by pixel. It finds no light, no normal and no lens, and fits nothing.
 """
 
+import contextlib
 import dataclasses
+import io
+import os
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -216,7 +220,7 @@ def _picture(path: Path) -> _Picture:
         raise ReadError(f"{path}: no such file, expected a picture of the table.")
     reader = needed("OpenEXR", f"{path}: a picture")
     try:
-        with reader.File(str(path), separate_channels=True) as file:
+        with _unheard(), reader.File(str(path), separate_channels=True) as file:
             parts, (corner, _) = len(file.parts), file.header()["dataWindow"]
             found = {layer: np.array(channel.pixels) for layer, channel in file.channels().items()}
     except (OSError, RuntimeError, ValueError) as error:
@@ -232,3 +236,16 @@ def _picture(path: Path) -> _Picture:
         every = np.where(alpha < 1.0, np.nan, every)
     corner = " × ".join(str(int(at)) for at in corner)
     return _Picture(every, f"{every.shape[2]} × {every.shape[1]} pixels of {', '.join(layers)} from {corner} on")
+
+
+@contextlib.contextmanager
+def _unheard() -> Iterator[None]:
+    """Nothing is printed of what OpenEXR says of damaged files, by Python and by itself; it has no option for that."""
+    with contextlib.redirect_stdout(io.StringIO()), open(os.devnull, "w") as nowhere:
+        stderr = os.dup(2)
+        try:
+            os.dup2(nowhere.fileno(), 2)
+            yield
+        finally:
+            os.dup2(stderr, 2)
+            os.close(stderr)

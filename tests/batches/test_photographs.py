@@ -173,6 +173,24 @@ def test_wrong_tables_are_one_sentence(content: str, message: str, table: Path, 
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("left", [0.5, 0.9])
+def test_of_a_damaged_picture_only_the_sentence_is_printed(
+    left: float, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """OpenEXR's own words on both streams are not; Python's are heard before and after."""
+    rng = np.random.default_rng(0)
+    draw(tmp_path / "a.exr", {"Y": rng.uniform(size=(64, 64)).astype(np.float32)})
+    whole = (tmp_path / "a.exr").read_bytes()
+    (tmp_path / "a.exr").write_bytes(whole[: int(left * len(whole))])
+    (tmp_path / "lights.csv").write_text("picture,theta_i,phi_i,irradiance\na.exr,60,0,4\n")
+    os.write(2, b"before ")
+    with pytest.raises(FitmatError, match=r"a\.exr: no picture can be read"):
+        read_photographs(tmp_path / "lights.csv")
+    print("after", file=sys.stderr)
+    out, err = capfd.readouterr()
+    assert (out, err) == ("", "before after\n")
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
