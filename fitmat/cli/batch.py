@@ -133,9 +133,9 @@ def texture(
                 found = fit_texture(source, folder, model, progress=watch, **told)
         except KeyboardInterrupt:
             watch.close()
-            kept = f"{watch.done:,} points are kept in {folder}: the same command goes on"
+            kept = f"{watch.most:,} points are kept in {folder}: the same command goes on"
             none = f"this run kept no points, which it does {TILE:,} at a time"
-            process.say(f"fitmat: interrupted; {kept if watch.done else none}.", err=True)
+            process.say(f"fitmat: interrupted; {kept if watch.most else none}.", err=True)
             interrupts.leave_threads()
     process.say(f"{found}\n\nArrays: {found.file}{_maps_told(found)}")
     measured = found.fits.result[found.fits.result != "too_few"]

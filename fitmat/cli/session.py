@@ -40,7 +40,8 @@ class Watch:
     the next step, so that what was done is kept; a second one, and any other, is as before.
 
     Attributes:
-        done: The most that was done of a stage.
+        done: How far the stage is.
+        most: How far any stage was.
     """
 
     def __init__(self, screen: Console) -> None:
@@ -49,7 +50,7 @@ class Watch:
         self._bar: Progress | None = None
         self._task = TaskID(0)
         self._before: Any = None
-        self._asked, self.done = False, 0
+        self._asked, self.done, self.most = False, 0, 0
 
     def open(self, what: str) -> None:
         """Show that something is going on, at a terminal only, before there is a stage."""
@@ -66,7 +67,7 @@ class Watch:
 
     def __call__(self, what: str, done: int, total: int) -> None:
         """Show the stage; stop where that was asked for."""
-        self.done = max(self.done, done)
+        self.done, self.most = done, max(self.most, done)
         what = visible(what)
         sampling = what.startswith(SAMPLING)
         if what != self._stage:

@@ -182,7 +182,15 @@ def test_a_long_stage_says_how_far_it_is_where_there_is_no_terminal(monkeypatch:
     ]
     now[0] += 100.0
     watch("weighing the models", 0, 0)
-    assert written.getvalue().splitlines()[4:] == ["Weighing the models."]
+    watch("drawing 100 pages", 0, 100)
+    now[0] += 60.0
+    watch("drawing 100 pages", 50, 100)
+    assert written.getvalue().splitlines()[4:] == [
+        "Weighing the models.",
+        "Drawing 100 pages.",
+        "50 of 100, about 60 s left.",
+    ]
+    assert watch.most == 320
 
 
 def test_at_a_terminal_news_of_a_stage_keep_its_bar() -> None:
