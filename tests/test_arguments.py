@@ -252,7 +252,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             "masking": (*TEXT, "mask"),
             **dict.fromkeys(("starts", "max_steps"), (0, *WHOLE)),
             "threads": without((0, *WHOLE), NOTHING),
-            "pool": POOLS,
+            **dict.fromkeys(("pool", "smooth"), POOLS),
             "progress": CALLED,
         },
     ),

@@ -20,7 +20,8 @@ from fitmat.batches.jobs import Job, digest, every_file, from_table
 from fitmat.batches.record import PARTS, Claim
 from fitmat.batches.runs import RUN, RUNS, is_there, link
 from fitmat.errors import FitmatError, OutputError
-from fitmat.fitting.pooling import Pooled, asked
+from fitmat.fitting.asking import asked
+from fitmat.fitting.pooling import Pooled
 from fitmat.reports import summary
 from fitmat.studies import DEFAULT_MODELS
 from fitmat.studies.plan import named, wants_all
@@ -117,7 +118,7 @@ def batch(
     if not wants_all(models):
         named(models)
     told = {"sampling": False} | dict(studying or {}) | {"models": models}
-    target, names, listed = Path(folder), asked(pool), _jobs(sources, jobs, dict(reading or {}), told)
+    target, names, listed = Path(folder), asked("pool", pool), _jobs(sources, jobs, dict(reading or {}), told)
     pools.refuse_idle(names, listed, told)
     if runs:
         listed = [dataclasses.replace(job, runs=target / RUNS) for job in listed]

@@ -1,6 +1,7 @@
 """Maps: a texture's parameters as pictures, and a glTF and a MaterialX material that bind them.
 
-Numbers are renamed, none is imitated: a point's material is glTF's with the same albedo, slope and F0.
+Numbers are renamed, none is imitated: a point's material is glTF's with the same albedo, slope and F0. What was
+smoothed is drawn so.
 """
 
 import io
@@ -33,16 +34,13 @@ ABOUT = (
 
 def maps(fits: Fits) -> dict[str, bytes]:
     """File names → contents; none where the points are in no rows and columns, or the model has no such parameters."""
-    names = {entry.name for entry in fits.entries}
-    level = next((name for name in ("f0", "eta") if name in names), None)
-    if fits.outcome.ndim != 2 or len(fits.channels) not in (1, 3) or level is None or not {"kd", "alpha"} <= names:
+    drawn = shown(fits)
+    if fits.outcome.ndim != 2 or len(fits.channels) not in (1, 3) or not drawn or not determined(fits).any():
         return {}
-    fitted = determined(fits)
-    if not fitted.any():
-        return {}
-    reflected = fits[level] if level == "f0" else f0_from_eta(fits[level])
-    f0 = _coloured(reflected) * (_coloured(fits["ks"]) if "ks" in names else 1.0)
-    base, rough, f0 = (_filled(part, fitted) for part in (_coloured(fits["kd"]), _coloured(np.sqrt(fits["alpha"])), f0))
+    level, parts = drawn[-1], {name: _coloured(_drawn(fits, name)) for name in drawn}
+    f0 = (parts[level] if level == "f0" else f0_from_eta(parts[level])) * parts.get("ks", 1.0)
+    base, rough = _filled(parts["kd"], _known(fits, "kd")), _filled(np.sqrt(parts["alpha"]), _known(fits, "alpha"))
+    f0 = _filled(f0, _known(fits, *drawn[2:]))
     most = float(np.clip(f0.max(), 1e-4, gltf.MOST_F0))
     packed = np.stack([np.zeros(rough.shape[:2]), rough[..., 1], np.zeros(rough.shape[:2])], axis=-1)
     return {
@@ -52,6 +50,31 @@ def maps(fits: Fits) -> dict[str, bytes]:
         SCENE: _scene(most).encode("ascii"),
         NODES: _nodes(most).encode("ascii"),
     }
+
+
+def shown(fits: Fits) -> tuple[str, ...]:
+    """The parameters that maps show, f0 or eta last; none of a model without kd, alpha and one of these."""
+    names = {entry.name for entry in fits.entries}
+    level = next((name for name in ("f0", "eta") if name in names), None)
+    if level is None or not {"kd", "alpha"} <= names:
+        return ()
+    return ("kd", "alpha", *(["ks"] if "ks" in names else []), level)
+
+
+def smoothed(fits: Fits) -> tuple[str, ...]:
+    """Those of them that maps show as they were smoothed."""
+    return tuple(n for n in shown(fits) if n in fits.smoothed and np.isfinite(fits.smoothed[n].value).all())
+
+
+def _drawn(fits: Fits, name: str) -> np.ndarray:
+    if name in fits.held:
+        return np.broadcast_to(fits.held[name], fits[name].shape)
+    return fits.smoothed[name].value if name in smoothed(fits) else fits[name]
+
+
+def _known(fits: Fits, *names: str) -> Bool[np.ndarray, "rows columns"]:
+    """Points at which all of these are fitted, smoothed, or held."""
+    return determined(fits) | ({*smoothed(fits), *fits.held} >= set(names))
 
 
 def determined(fits: Fits) -> Bool[np.ndarray, "..."]:

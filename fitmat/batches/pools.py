@@ -10,7 +10,7 @@ import numpy as np
 
 from fitmat.batches.jobs import Job
 from fitmat.errors import ModelError
-from fitmat.fitting import pooling
+from fitmat.fitting import asking, pooling
 from fitmat.fitting.quantities import BOUND
 from fitmat.models.parameters import Param, entries
 from fitmat.models.registry import model
@@ -37,7 +37,7 @@ def refuse_idle(names: Sequence[str], jobs: Sequence[Job], told: Mapping[str, An
     """
     if not names:
         return
-    pooling.refuse_idle(names, len(jobs), "file", told.get("fixed") or (), told.get("priors") or ())
+    asking.refuse_idle("pool", names, len(jobs), "file", told.get("fixed") or (), told.get("priors") or ())
     asked = [job.studying["models"] for job in jobs]
     if not any(wants_all(one) for one in asked) and not (told.get("dispersion") or told.get("tilt")):
         _refuse_foreign(names, dict.fromkeys(name for one in asked for name in _known(one)))
@@ -53,7 +53,7 @@ def _known(asked: Any) -> list[str]:
 
 def _refuse_foreign(names: Sequence[str], models: Collection[str]) -> None:
     if models:
-        pooling.refuse_foreign(names, {of: _parameters(of) for of in models})
+        asking.refuse_foreign("pool", names, {of: _parameters(of) for of in models})
 
 
 def _parameters(of: str) -> dict[str, Param]:

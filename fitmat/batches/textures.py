@@ -1,6 +1,6 @@
 """Textures: an atlas fitted tile by tile, each tile kept when it is done, and the arrays of all points.
 
-What was done before is not done again. The fits are `fitmat.fit_many`'s.
+What was done before is not done again. The fits are `fitmat.fit_many`'s, and all points are smoothed together.
 """
 
 import dataclasses
@@ -8,7 +8,7 @@ import hashlib
 import io
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from fitmat.fitting.losses import DEFAULT, loss
 from fitmat.fitting.many.concluding import OUTCOMES
 from fitmat.fitting.many.fits import Fits
 from fitmat.fitting.many.fitting_many import fit_many, shared_by_all
+from fitmat.fitting.many.sharing import refuse_idle, sharing, told_together
 from fitmat.maths.parts import slices
 from fitmat.text import brief
 
@@ -46,7 +47,8 @@ class Texture:
 
     Attributes:
         file: The arrays on disk: each parameter by its name, `NAME_sd`, `outcome` with the `outcomes` that its numbers
-            mean, `discrepancy`, `n_values`, and the names of the `channels`.
+            mean, `discrepancy`, `n_values`, and the names of the `channels`; of what was smoothed `NAME_smooth`,
+            `NAME_smooth_sd` and `NAME_inferred`.
         maps: Pictures of the parameters, and a glTF and a MaterialX material that bind them; see `maps`.
         fits: The arrays.
         earlier: Points that an earlier run had fitted.
@@ -69,6 +71,7 @@ def fit_texture(
     folder: str | os.PathLike[str],
     model: str = "lambert+ggx",
     *,
+    smooth: str | Sequence[str] | None = None,
     force: bool = False,
     progress: Progress | None = None,
     **told: Any,
@@ -79,13 +82,14 @@ def fit_texture(
         source: The atlas, as `read_atlas` takes it, or the table of lights of pictures, as `read_photographs` does.
         folder: For `texture.npz` or `texture.zarr`, and what is kept to go on after an interruption.
         model: Name of the model.
+        smooth: As in `fitmat.fit_many`; of a texture that is done nothing is fitted again.
         force: Replace the results of something else in the folder.
         progress: Called with what is done, how many points are done, and how many there are.
         **told: `fixed`, `loss`, `masking`, `starts`, `max_steps` and `threads` of `fitmat.fit_many`.
 
     Raises:
-        FitmatError: the atlas cannot be read, the arguments do not fit, results would be lost and `force` is off,
-            another run writes there, or the disk refuses.
+        FitmatError: the atlas cannot be read, the arguments do not fit, nothing could be smoothed, results would
+            be lost and `force` is off, another run writes there, or the disk refuses.
 
     Example:
         >>> fit_texture("atlas.npz", "out").fits["alpha"]  # doctest: +SKIP
@@ -93,15 +97,17 @@ def fit_texture(
     arguments.kind("source", source, str, os.PathLike)
     arguments.kind("folder", folder, str, os.PathLike)
     arguments.kind("model", model, str)
+    names = sharing(None, smooth)
     suffix, target, say = Path(source).suffix.lower(), Path(folder), progress or (lambda *_: None)
     atlas = read_photographs(Path(source)) if suffix == TABLE else read_atlas(Path(source))
     given = told.get("fixed") or {}, loss(told.get("loss", DEFAULT.name)), told.get("masking")
     shared, held = shared_by_all([atlas.wi, atlas.wo], len(atlas.channels), model, *given)
     axes, count = atlas.points, int(np.prod(atlas.points))
+    refuse_idle(names, shared, held, axes)
     name = f"{RESULT}{ZARR if suffix == ZARR else '.npz'}"
     with files.alone(target):
         keys = [_key(atlas, *atlas.tile(part), model, told) for part in slices(count, TILE)]
-        of = {name: record.digest([axes, atlas.channels, keys])}
+        of = {name: record.digest([axes, atlas.channels, keys, *([sorted(names.smooth)] if names.smooth else [])])}
         claim = record.claimed(target, of, (name, *MAPS), force=force)
         each, words = [], f"fitting {count} points"
         say(words, 0, count)
@@ -110,7 +116,7 @@ def fit_texture(
             say(words, part.stop, count)
         whole = {field: np.concatenate([tile[field] for tile, _ in each]) for field in KEPT}
         shaped: dict[str, Any] = {field: part.reshape(*axes, *part.shape[1:]) for field, part in whole.items()}
-        fits = Fits(shared.template, atlas.channels, held, **shaped)
+        fits = told_together(names, Fits(shared.template, atlas.channels, held, **shaped), progress)
         drawn = maps(fits)
         claim.renew((name, *drawn), [f"{key}.npz" for key in keys])
         file = _written(target / name, _arrays(fits))
@@ -175,4 +181,7 @@ def _arrays(fits: Fits) -> dict[str, np.ndarray]:
     for entry in fits.entries:
         found |= {entry.name: fits[entry.name], f"{entry.name}_sd": fits.sd_of(entry.name)}
     found |= {"outcome": fits.outcome, "outcomes": np.array(list(OUTCOMES)), "channels": np.array(fits.channels)}
+    for name, part in fits.smoothed.items():
+        if np.isfinite(part.value).any():
+            found |= {f"{name}_smooth": part.value, f"{name}_smooth_sd": part.sd, f"{name}_inferred": part.inferred}
     return found | {"discrepancy": fits.discrepancy, "n_values": fits.n_values}

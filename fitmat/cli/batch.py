@@ -16,7 +16,7 @@ from rich.text import Text
 
 from fitmat.batches.atlas import SUFFIXES
 from fitmat.batches.batch import PAGE, Batch, batch
-from fitmat.batches.maps import determined
+from fitmat.batches.maps import determined, shown, smoothed
 from fitmat.batches.photographs import TABLE
 from fitmat.batches.textures import TILE, Texture, fit_texture
 from fitmat.cli import interrupts, process, session
@@ -26,7 +26,7 @@ from fitmat.studies import DEFAULT_MODELS
 from fitmat.text import visible
 
 TEXTURE = {
-    *("files", "lights", "out", "force", "processes", "device"),
+    *("files", "lights", "out", "force", "processes", "device", "smooth"),
     *("models", "loss", "masking", "fix", "seed"),
 }
 """Parameters of the command that a texture takes; without draws the seed is of no consequence."""
@@ -51,11 +51,11 @@ def run(
         jobs: Table of what differs from file to file.
         reading: Arguments of `fitmat.read`.
         studying: Arguments of `fitmat.study`, models included.
-        doing: How many processes work side by side, or the scheduler of a cluster; the device; what to pool; whether
-            each file leaves a run too, and whether to replace results of something else.
+        doing: How many processes work side by side, or the scheduler of a cluster; the device; what to pool; what to
+            smooth; whether each file leaves a run too, and whether to replace results of something else.
 
     Raises:
-        FitmatError: as `batch`, or the device is no CPU.
+        FitmatError: as `batch`, the device is no CPU, or files are to be smoothed.
         SystemExit: it was interrupted.
     """
     told, doing = dict(studying), dict(doing)
@@ -63,6 +63,10 @@ def run(
     if (device := doing.pop("device")) != "cpu":
         raise FitmatError(
             f"--device {device} for files, expected a texture (.npz, .zarr): files are fitted on the CPU."
+        )
+    if (smooth := doing.pop("smooth")) is not None:
+        raise FitmatError(
+            f"--smooth {smooth} for files, expected a texture (.npz, .zarr) or --lights: files have no neighbours."
         )
     if odd := next((source for source in sources if is_texture([source])), None):
         raise FitmatError(f"{odd}: a texture beside other files, expected it alone. Give one texture at a time.")
@@ -111,7 +115,8 @@ def texture(
         folder: Where to.
         typed: Parameters that stand on the command line → their flags; those that are of no use here are refused.
         studying: Arguments of `fitmat.study`, of which a texture takes some.
-        doing: How many threads work side by side, on which device, and whether to replace results of something else.
+        doing: How many threads work side by side, on which device, what to smooth, and whether to replace results of
+            something else.
 
     Raises:
         FitmatError: as `fit_texture`, a flag is of no use to a texture, or there is no such device.
@@ -126,7 +131,7 @@ def texture(
     if doing["device"] == "gpu":
         process.use_gpu()
     told = {name: studying[name] for name in ("loss", "masking", "fixed")}
-    told |= {"threads": doing["threads"], "force": doing["force"]}
+    told |= {name: doing[name] for name in ("threads", "smooth", "force")}
     with session.computing() as watch:
         try:
             with interrupts.raised():
@@ -158,8 +163,12 @@ def _maps_told(found: Texture) -> str:
         return "\nNo maps: no point has a fit that is determined."
     if not found.maps:
         return ""
-    median = f"; {others} of {count} points, whose fits are not determined, have the others' median in them"
-    return f"\nMaps: {', '.join(path.name for path in found.maps)}{median if others else ''}"
+    smooth = smoothed(found.fits)
+    drawn = f", of the smoothed {', '.join(smooth)}" if smooth else ""
+    rest = [name for name in shown(found.fits) if name not in {*smooth, *found.fits.held}]
+    of = f" of {', '.join(rest)}" if smooth else ""
+    median = f"; {others} of {count} points, whose fits are not determined, have the others' median{of} in them"
+    return f"\nMaps: {', '.join(path.name for path in found.maps)}{drawn}{median if others and rest else ''}"
 
 
 def show(found: Batch, screen: Console | None = None) -> None:

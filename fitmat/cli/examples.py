@@ -55,7 +55,7 @@ BATCH = (
     "  fitmat batch atlas.npz --models lambert+ggx --loss gaussian\n\n"
     "  fitmat batch 'scans/*.csv' --models lambert+ggx --fix ks=1\n\n"
     "  fitmat batch --jobs jobs.csv\n\n"
-    "  fitmat batch --lights photos/lights.csv"
+    "  fitmat batch --lights photos/lights.csv --smooth alpha,kd"
 )
 
 LABS = (

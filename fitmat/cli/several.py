@@ -21,6 +21,7 @@ from fitmat.cli.flags.batch import (
     ReplaceBatchFlag,
     RunsFlag,
     SchedulerFlag,
+    SmoothFlag,
     SourcesFlag,
 )
 from fitmat.cli.flags.files import JsonFlag
@@ -91,6 +92,7 @@ def batch(
     device: DeviceFlag = "cpu",
     pool: PoolFlag = None,
     runs: RunsFlag = False,
+    smooth: SmoothFlag = None,
     mcmc: McmcFlag = False,
     seed: SeedFlag = 0,
     fix: FixFlag = None,
@@ -111,10 +113,10 @@ def batch(
     told |= {"dispersion": dispersion, "film": film, "sampling": mcmc} | fit.known(fix or [], prior or [])
     read = reading | {"instrument": instrument}
     if lights is not None or batch.is_texture(files or []):
-        doing = {"threads": processes, "device": device, "force": force}
+        doing = {"threads": processes, "device": device, "smooth": smooth, "force": force}
         return batch.texture(batch.alone(lights, files or []), out, typed(context), told, doing)
     doing = {"processes": processes, "scheduler": scheduler, "device": device, "pool": pool}
-    doing |= {"runs": runs, "force": force}
+    doing |= {"runs": runs, "smooth": smooth, "force": force}
     found = batch.run(files or [], out, jobs, read, told, doing)
     batch.show(found)
     if found.counts["refused"]:

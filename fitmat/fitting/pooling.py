@@ -6,14 +6,10 @@ determined stays. It fits nothing, and the other parameters of a surface stay as
 """
 
 import dataclasses
-import itertools
-from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
 from jaxtyping import Float
 
-from fitmat import arguments
-from fitmat.errors import ModelError
 from fitmat.maths.hierarchy import FEWEST, population
 from fitmat.maths.normal import Z95
 from fitmat.models.parameters import Param
@@ -109,68 +105,3 @@ def pooled(name: str, param: Param, low: Float[np.ndarray, "..."], high: Float[n
         count,
         used.size - count,
     )
-
-
-def asked(pool: object) -> tuple[str, ...]:
-    """The names that an argument `pool` holds.
-
-    Args:
-        pool: A name, or several with commas between them or in a list; None for none.
-
-    Raises:
-        FitmatError: it is something else, or names nothing.
-    """
-    arguments.kind("pool", pool, str, list, tuple, optional=True)
-    if pool is None:
-        return ()
-    given = pool.split(",") if isinstance(pool, str) else list(pool) if isinstance(pool, list | tuple) else []
-    for one in given:
-        arguments.kind("a name in pool", one, str)
-    names = tuple(dict.fromkeys(one.strip() for one in given if one.strip()))
-    if not names:
-        arguments.refuse("pool", pool, "the name of a parameter")
-    return names
-
-
-def refuse_idle(
-    names: Iterable[str], count: int, what: str, held: Collection[str], priors: Collection[str] = ()
-) -> None:
-    """Stop before anything is fitted where nothing could be pooled.
-
-    Args:
-        names: Of what is to be pooled.
-        count: How many surfaces there are.
-        what: Each is called, in the singular.
-        held: Parameters that are held.
-        priors: Those that have a prior.
-
-    Raises:
-        ModelError: a parameter is known beforehand, or there are too few surfaces.
-    """
-    for name in names:
-        begun = f"pool {name} (--pool)"
-        if name in held:
-            raise ModelError(f"{begun}: it is held, expected a parameter that is fitted. Leave one out.")
-        if name in priors:
-            got = "it has a prior (--prior), expected none: the others are its prior"
-            raise ModelError(f"{begun}: {got}. Leave one out.")
-        if count < FEWEST:
-            got = f"{count} {what}{'s' if count > 1 else ''}"
-            raise ModelError(f"{begun}: {got}, expected at least {FEWEST}, of which some can differ.")
-
-
-def refuse_foreign(names: Iterable[str], parameters: Mapping[str, Iterable[str]]) -> None:
-    """Stop where no model has what is to be pooled.
-
-    Args:
-        names: Of what is to be pooled.
-        parameters: Of each model, by its name.
-
-    Raises:
-        ModelError: names the parameter, the models, and what they have.
-    """
-    having = list(dict.fromkeys(itertools.chain(*parameters.values())))
-    for name in names:
-        if name not in having:
-            got = f"no model of {', '.join(parameters)} has it"
-            raise ModelError(f"pool {name} (--pool): {got}, expected one of {', '.join(having)}.")

@@ -68,6 +68,16 @@ PoolFlag = Annotated[
     ),
 ]
 
+SmoothFlag = Annotated[
+    str | None,
+    typer.Option(
+        help="Parameters in which neighbouring points of a texture differ little, as alpha,kd: each point's is drawn "
+        "to its neighbours as far as its own data leave it open, less across edges (arrays NAME_smooth, and the maps).",
+        metavar="NAMES",
+        show_default=False,
+    ),
+]
+
 DeviceFlag = Annotated[
     Literal["cpu", "gpu"], typer.Option(help="Where the points of a texture are fitted; files always on the CPU.")
 ]

@@ -12,6 +12,7 @@ from jaxtyping import Float, Int
 from fitmat.errors import ModelError
 from fitmat.fitting.many.concluding import OUTCOMES
 from fitmat.fitting.pooling import Pooled
+from fitmat.fitting.smoothing import Smoothed
 from fitmat.models.base import AbstractBRDF
 from fitmat.models.parameters import Entry, entries, with_vector
 from fitmat.text import brief
@@ -34,6 +35,7 @@ class Fits:
         steps: Levenberg–Marquardt iterations of the best start, (…).
         n_values: Values that were fitted, (…).
         pooled: Parameters that were pooled, by name, with their channel where each has its own.
+        smoothed: Parameters that were smoothed, by name.
     """
 
     template: AbstractBRDF
@@ -47,6 +49,7 @@ class Fits:
     steps: Int[np.ndarray, "..."]
     n_values: Int[np.ndarray, "..."]
     pooled: Mapping[str, Pooled] = dataclasses.field(default_factory=dict)
+    smoothed: Mapping[str, Smoothed] = dataclasses.field(default_factory=dict)
 
     __repr__ = brief
 
@@ -102,5 +105,5 @@ class Fits:
     def __str__(self) -> str:
         """How many ended how."""
         ended = ", ".join(f"{number} {name}" for name, number in self.counts.items())
-        told = [f"{self.outcome.size} fits of {self.name}: {ended}.", *map(str, self.pooled.values())]
-        return "\n".join(told)
+        together = map(str, (*self.pooled.values(), *self.smoothed.values()))
+        return "\n".join([f"{self.outcome.size} fits of {self.name}: {ended}.", *together])

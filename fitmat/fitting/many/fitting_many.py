@@ -3,9 +3,8 @@
 Likelihood, bounds, convergence and outcomes are those of `fitmat.fit`. It reads no file.
 """
 
-import dataclasses
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,18 +13,17 @@ from jaxtyping import ArrayLike, Float
 from fitmat import arguments
 from fitmat._types import Progress
 from fitmat.errors import FitmatError, ModelError, ReadError
-from fitmat.fitting import pooling
-from fitmat.fitting.coordinates import channel_names, coordinates
+from fitmat.fitting.coordinates import coordinates
 from fitmat.fitting.fitting import asked_model, held_values, refuse_single_precision
 from fitmat.fitting.losses import DEFAULT, Loss
 from fitmat.fitting.losses import loss as find_loss
 from fitmat.fitting.many.fits import Fits
 from fitmat.fitting.many.gathering import padded
 from fitmat.fitting.many.lanes import Shared
+from fitmat.fitting.many.sharing import refuse_idle, sharing, told_together
 from fitmat.fitting.many.table import table
 from fitmat.fitting.many.tiles import Work, each
 from fitmat.fitting.refining import MAX_STEPS
-from fitmat.maths.normal import Z95
 from fitmat.measurements.samples import default_channels
 from fitmat.models import names
 from fitmat.models.base import AbstractBRDF, direction_pairs
@@ -51,6 +49,7 @@ def fit_many(
     max_steps: int = MAX_STEPS,
     threads: int | None = None,
     pool: str | Sequence[str] | None = None,
+    smooth: str | Sequence[str] | None = None,
     progress: Progress | None = None,
 ) -> Fits:
     """Fit a model to many surfaces, or to each point of one, that were seen from the same directions.
@@ -72,6 +71,8 @@ def fit_many(
         threads: How many work side by side; None for one for each core.
         pool: Parameters in which the surfaces are taken to be of one kind: each is drawn to the others as far as its
             own data leave it open, `Fits.pooled`; values and deviations stay.
+        smooth: Parameters of points in rows and columns that are taken to differ little from those of their neighbours,
+            but where two materials meet: `Fits.smoothed`; values and deviations stay.
         progress: Called with what is done, how many surfaces are done, and how many there are.
 
     Returns:
@@ -79,7 +80,7 @@ def fit_many(
 
     Raises:
         FitmatError: float64 is off, shapes do not fit, the model is unknown, nothing is left to fit, or what is to be
-            pooled is held, unknown, or of fewer than three surfaces.
+            pooled or smoothed is held, unknown, or of fewer than three surfaces.
 
     Example:
         >>> wi, wo = directions(30, degrees=True), directions([0, 15, 30, 45], 180, degrees=True)  # doctest: +SKIP
@@ -92,7 +93,7 @@ def fit_many(
         arguments.whole(name, given, 1)
     arguments.whole("threads", threads, 1, optional=True)
     arguments.function("progress", progress)
-    names, pair = pooling.asked(pool), direction_pairs(wi, wo)
+    asked, pair = sharing(pool, smooth), direction_pairs(wi, wo)
     numbers = _values(value, len(pair[0]))
     noise = None if sigma is None else _noise(sigma, numbers, np.shape(value))
     shared, held = shared_by_all(pair, numbers.shape[-1], to, fixed or {}, find_loss(loss), masking)
@@ -100,7 +101,7 @@ def fit_many(
         raise FitmatError(
             f"sigma is None, expected the noise: the loss {shared.loss.name} (--loss) needs it. Give it, or another."
         )
-    _refuse_idle(names, shared, held, int(np.prod(numbers.shape[:-2])))
+    refuse_idle(asked, shared, held, numbers.shape[:-2])
     axes, flat = numbers.shape[:-2], numbers.reshape(-1, *numbers.shape[-2:])
     noise = None if noise is None else noise.reshape(flat.shape)
     work, count = Work(shared, table(shared, held), starts, max_steps), threads or os.cpu_count() or 1
@@ -114,32 +115,7 @@ def fit_many(
     )
     shaped: dict[str, Any] = {name: part.reshape(*axes, *part.shape[1:]) for name, part in found.items()}
     fits = Fits(shared.template, default_channels(numbers.shape[-1]), held, **shaped)
-    return dataclasses.replace(fits, pooled=dict(_pooled(names, fits))) if names else fits
-
-
-def _refuse_idle(names: Sequence[str], shared: Shared, held: Mapping[str, np.ndarray], count: int) -> None:
-    """Stop where nothing could be pooled."""
-    pooling.refuse_idle(names, count, "surface", held)
-    pooling.refuse_foreign(names, {shared.template.name: [entry.name for entry in entries(shared.template)]})
-    if names and not shared.loss.posterior:
-        got = f"the loss {shared.loss.name} is no likelihood"
-        raise ModelError(f"pool {names[0]} (--pool): {got}, expected one that gives intervals.")
-
-
-def _pooled(names: Sequence[str], fits: Fits) -> Iterator[tuple[str, pooling.Pooled]]:
-    """Each parameter, and each channel of it, from values ± 1.96 sd of its natural coordinate."""
-    ended = np.isin(fits.result, ("converged", "at_bound", "unidentifiable"))
-    for entry in fits.entries:
-        for k, label in enumerate(channel_names(entry, fits.channels)):
-            if entry.name in names:
-                place = entry.place.start + k
-                value = fits.values[..., place]
-                reach = np.where(ended, Z95 * fits.sd[..., place], np.nan)
-                if entry.param.scale == "log":
-                    ends = value * np.exp(-reach / value), value * np.exp(reach / value)
-                else:
-                    ends = value - reach, value + reach
-                yield label, pooling.pooled(label, entry.param, *ends)
+    return told_together(asked, fits, progress)
 
 
 def _values(given: ArrayLike, rows: int) -> Float[np.ndarray, "... n c"]:
