@@ -72,12 +72,16 @@ def plot(
     force: ReplacePaperFlag = False,
 ) -> None:
     """Draw a picture of a run for a paper, and write its numbers beside it."""
-    process.set_up()
-    from fitmat.reports import paper
-    from fitmat.studies.result import load
+    from fitmat.cli import session
 
     told = {"channel": 0 if channel is None else channel, "model": model, "width_mm": width, "force": force}
-    written = paper.save(load(result), out, what, **told)
+    with session.computing() as watch:
+        from fitmat.reports import paper
+        from fitmat.studies.result import load
+
+        run = load(result)
+        watch(f"drawing {what}", 0, 0)
+        written = paper.save(run, out, what, **told)
     process.say("\n".join(visible(str(path)) for path in written))
 
 

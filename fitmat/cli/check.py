@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fitmat._types import Progress
 from fitmat.judgement.examination.examining import Examination, examine
 from fitmat.measurements.reader import read
 from fitmat.reports.pictures import refuse_picture, write_picture
@@ -17,20 +18,25 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def examined(sources: Sequence[Path], reading: Mapping[str, Any], picture: Path | None, *, force: bool) -> Examination:
+def examined(
+    sources: Sequence[Path], reading: Mapping[str, Any], picture: Path | None, say: Progress, *, force: bool
+) -> Examination:
     """What files tell as one measurement; nothing is read where the picture could not be written.
 
     Args:
         sources: Files to read.
         reading: Arguments of `fitmat.read`.
         picture: That will be drawn.
+        say: Is told what is done.
         force: Whether to replace it.
 
     Raises:
         FitmatError: as `fitmat.read`, and of a picture that cannot be written.
     """
     refuse_picture(picture, force=force)
-    return examine(read(sources, **reading))
+    measurements = read(sources, **reading)
+    say(f"examining {', '.join(path.name for path in sources)}", 0, 0)
+    return examine(measurements)
 
 
 def draw(found: Examination, picture: Path) -> None:

@@ -141,17 +141,21 @@ def simulate(
     force: ReplaceFlag = False,
 ) -> None:
     """Simulate measurements of a known material, to test an instrument's plan or fitmat itself."""
-    process.set_up()
-    from fitmat.cli import simulate
+    from fitmat.cli import session
 
-    if catalogue is not None:
-        written = simulate.write_catalogue(catalogue, force=force)
-    else:
-        angles = simulate.grid(theta_i, theta_o, phi, phi_i)
-        known = {"ior": ior, "film": film, "dispersion": dispersion}
-        truth, channels = simulate.truth(model, set_ or [], masking, wavelengths, **known)
-        measuring = {"noise": (noise, floor, seed), "samples": samples, "instrument": instrument}
-        written = simulate.write_simulation(out, truth, angles, channels, **measuring, force=force)
+    with session.computing() as watch:
+        from fitmat.cli import simulate
+
+        if catalogue is not None:
+            watch("simulating the catalogue", 0, 0)
+            written = simulate.write_catalogue(catalogue, force=force)
+        else:
+            angles = simulate.grid(theta_i, theta_o, phi, phi_i)
+            known = {"ior": ior, "film": film, "dispersion": dispersion}
+            truth, channels = simulate.truth(model, set_ or [], masking, wavelengths, **known)
+            measuring = {"noise": (noise, floor, seed), "samples": samples, "instrument": instrument}
+            watch(f"simulating {truth.name}", 0, 0)
+            written = simulate.write_simulation(out, truth, angles, channels, **measuring, force=force)
     process.say("\n".join(visible(str(path)) for path in written))
 
 
@@ -169,16 +173,20 @@ def check(
     json_: JsonFlag = False,
 ) -> None:
     """Describe a file before any fit: what was measured where, how consistently, and what can be learnt from it."""
-    process.set_up()
-    from fitmat.maths import programs
+    from fitmat.cli import session
 
-    with programs.ahead("check"):
-        from fitmat.cli import check
+    with session.computing() as watch:
+        from fitmat.maths import programs
 
-        found = check.examined(files, reading | {"instrument": instrument}, plot, force=force)
+        with programs.ahead("check"):
+            from fitmat.cli import check
+
+            found = check.examined(files, reading | {"instrument": instrument}, plot, watch, force=force)
     process.say(check.as_json(found) if json_ else str(found))
     if plot is not None:
-        check.draw(found, plot)
+        with session.watch() as watch:
+            watch(f"drawing {plot.name}", 0, 0)
+            check.draw(found, plot)
     elif not json_:
         process.say(check.hint(files))
 

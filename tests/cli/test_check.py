@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import test_commands
-from test_commands import Run, assert_refused, curves, shell, strict
+from test_commands import Run, assert_refused, beside_progress, curves, shell, strict
 
 from fitmat.errors import FitmatError
 from fitmat.measurements.instrument import UNKNOWN_SCALE, Instrument
@@ -53,7 +53,8 @@ def sparse(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_check_describes_and_tells_how_to_see(run: Run, sparse: Path) -> None:
     ended = run("check", sparse)
-    assert (ended.code, ended.err) == (0, "")
+    assert (ended.code, beside_progress(ended.err)) == (0, "")
+    assert ended.err.splitlines()[0] == "Examining sparse.csv."
     first, *_, last = ended.out.splitlines()
     assert first == "sparse.csv: 51 samples, channel value."
     assert last == "See what was measured where: fitmat check sparse.csv --plot coverage.png"
@@ -87,7 +88,7 @@ def test_check_json_is_one_object_without_nan(run: Run, tmp_path: Path, content:
     path = tmp_path / "odd.csv"
     path.write_text(content)
     ended = run("check", path, "--json", "--scale", "linear")
-    assert (ended.code, ended.err) == (0, "")
+    assert (ended.code, beside_progress(ended.err)) == (0, "")
     found = strict(ended.out)
     assert found["file"] == "odd.csv"
     assert found["samples"] == content.count("\n") - 1
@@ -103,7 +104,8 @@ SIGNATURES = {"map.png": b"\x89PNG\r\n\x1a\n", "map.PNG": b"\x89PNG\r\n\x1a\n", 
 @pytest.mark.parametrize(("name", "signature"), SIGNATURES.items(), ids=SIGNATURES)
 def test_check_draws_what_the_suffix_says(run: Run, sparse: Path, name: str, signature: bytes) -> None:
     ended = run("check", sparse, "--plot", name, "--json")
-    assert (ended.code, ended.err) == (0, "")
+    assert (ended.code, beside_progress(ended.err)) == (0, "")
+    assert ended.err.splitlines()[-1] == f"Drawing {name}."
     assert strict(ended.out)["samples"] == 51
     content = Path(name).read_bytes()
     assert content.startswith(signature)
@@ -153,7 +155,7 @@ def test_what_was_found_is_printed_before_a_picture_fails(
 @pytest.mark.study
 def test_check_out_of_process_prints_json_and_nothing_else(environment: dict[str, str], sparse: Path) -> None:
     ended = shell(environment, "check", sparse, "--json", "--plot", "map.png")
-    assert (ended.returncode, ended.stderr) == (0, "")
+    assert (ended.returncode, beside_progress(ended.stderr)) == (0, "")
     assert strict(ended.stdout)["warnings"] == []
     assert sorted(os.listdir()) == ["map.png", "sparse.csv"]
 
@@ -383,7 +385,7 @@ def test_joined_halves_reach_the_fit_as_the_whole(run: Run, halves: list[str], r
 
 def test_check_and_convert_join_too(run: Run, halves: list[str]) -> None:
     ended = run("check", *halves, "--join")
-    assert (ended.code, ended.err) == (0, "")
+    assert (ended.code, beside_progress(ended.err)) == (0, "")
     assert ended.out.startswith("steep.csv + flat.txt: 51 samples, channel value.\n")
     assert ended.out.endswith("fitmat check steep.csv flat.txt --join --plot coverage.png\n")
     assert run("convert", *halves, "all.csv", "--join").code == 0

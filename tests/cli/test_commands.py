@@ -104,7 +104,7 @@ def test_bad_file(run, tmp_path, content, sentence):
 
 
 PROGRESS = re.compile(
-    r"((Fitting|Sampling|Comparing|Weighing|Examining|Writing|Looking|Reading) ?[^\n]*\."
+    r"((Fitting|Sampling|Comparing|Weighing|Examining|Writing|Looking|Reading|Drawing|Simulating) ?[^\n]*\."
     r"|compiling .*, once for this machine)\n"
 )
 """What is told of the progress where stderr is no terminal."""
@@ -432,7 +432,8 @@ def test_simulate_and_fit_agree(run, tmp_path):
     path = tmp_path / "new" / "paint.csv"
     truth = ("--set", "kd=0.4,0.1,0.2", "--set", "alpha=0.3", "--theta-i", "20,45,70", "--theta-o", "-80:80:10")
     ended = run("simulate", "lambert+ggx", *truth, "--seed", 3, "--out", path)
-    assert ended == (0, f"{path}\n", "")
+    assert (ended.code, ended.out, beside_progress(ended.err)) == (0, f"{path}\n", "")
+    assert ended.err.splitlines()[0] == "Simulating lambert+ggx."
     assert path.read_text().startswith("# simulated lambert+ggx; noise 0.02 relative + 0.001 sr^-1, seed 3\n")
     assert_refused(run("simulate", "lambert", "--out", path), "already exists; give another name, or --force")
     ended = run("fit", path, "--models", "lambert+ggx", "--no-mcmc", "--json")
@@ -470,7 +471,8 @@ def test_a_simulated_metal_says_its_wavelength_or_has_it_said(run, tmp_path):
     told = ("simulate", "ggx", "--ior", "Au", "--theta-i", "0", "--theta-o", "0", "--noise", 0, "--floor", 0)
     assert "--ior Au: taken at 550 nm" in run(*told, "--out", tmp_path / "a.csv").err
     ended = run(*told, "--wavelengths", "450.9", "--out", tmp_path / "b.csv")
-    assert (ended.code, ended.err) == (0, "")
+    assert (ended.code, beside_progress(ended.err)) == (0, "")
+    assert ended.err.splitlines()[0] == "Simulating ggx-conductor."
     assert fm.read(tmp_path / "b.csv").channels == ("450.9",)
 
 

@@ -10,8 +10,10 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
+from typer.testing import CliRunner
 
 import fitmat as fm
+from fitmat.cli.application import app
 from fitmat.errors import FitmatError
 from fitmat.maths.directions import from_angles
 from fitmat.reports import paper, plot
@@ -224,3 +226,11 @@ def test_what_cannot_be_drawn_is_said(studied: Study, run: Path, tmp_path: Path)
     with pytest.raises(FitmatError, match=r"c\.csv: already exists; choose another name, or --force"):
         paper.save(studied, tmp_path / "c.svg")
     assert not (tmp_path / "c.svg").exists()
+
+
+def test_the_command_says_what_it_draws_before_it_does(run: Path, tmp_path: Path) -> None:
+    """On stderr; on stdout are the files alone."""
+    ended = CliRunner().invoke(app, ["plot", str(run), "--out", str(tmp_path / "a.svg")])
+    assert ended.exit_code == 0, ended.output
+    assert ended.stderr.splitlines()[0] == "Drawing curves."
+    assert ended.stdout.splitlines() == [str(tmp_path / "a.svg"), str(tmp_path / "a.csv")]
