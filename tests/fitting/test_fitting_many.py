@@ -16,8 +16,9 @@ from fitmat.fitting.many import tiles
 from fitmat.fitting.many.concluding import OUTCOMES, TOO_FEW
 from fitmat.fitting.many.fitting_many import shared_by_all
 from fitmat.fitting.many.gathering import gathered
+from fitmat.fitting.many.solving import BEHIND, PATIENCE, Ends, solve_many
 from fitmat.fitting.many.table import begin_many, table
-from fitmat.fitting.refining import SETTLED
+from fitmat.fitting.refining import BURST, SETTLED
 from fitmat.measurements.samples import Measurements
 
 SAMPLES, SURFACES = 64, 40
@@ -176,6 +177,39 @@ def test_a_ridge_does_not_end_where_another_start_goes_on() -> None:
     found = fm.fit_many(wi, wo, value)
     np.testing.assert_allclose(found["eta"], 1.5, rtol=0.01)
     np.testing.assert_allclose(found["alpha"], alpha, rtol=0.01)
+
+
+def test_a_start_that_is_far_behind_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Second starts creep towards bounds for hundreds of steps; the optimum is still the one that scipy finds."""
+    value, sigma = surfaces(256)
+    ended: list[tuple[np.ndarray, Ends]] = []
+
+    def watched(*told: Any) -> Any:
+        found = solve_many(*told)
+        count = told[5][0]
+        ended.append((told[2][:count], Ends(*(np.asarray(part)[:count] for part in found))))
+        return found
+
+    monkeypatch.setattr(tiles, "solve_many", watched)
+    found = fm.fit_many(WI, WO, value, "lambert+ggx", sigma=sigma, loss="gaussian", threads=1)
+    of, ends = ended[0]
+
+    def residual(p: np.ndarray, k: int) -> np.ndarray:
+        return (p[0] / np.pi + p[1] * brdf(WI, WO, p[2], p[3]) - value[k, :, 0]) / sigma[k, :, 0]
+
+    half = np.array([0.5 * np.sum(residual(p, k) ** 2) for k, p in enumerate(found.values)])
+    behind = ends.log_likelihood < -half[of] - BEHIND
+    assert np.count_nonzero(behind) > 10
+    assert ends.steps[behind].max() <= PATIENCE + BURST
+    for k in np.unique(of[behind])[:8]:
+        best = scipy.optimize.least_squares(
+            residual,
+            [0.4, 1.0, 0.3, 1.6],
+            x_scale=found.values[k],
+            bounds=([0.0, 0.0, 1e-4, 1.0], [1.0, 10.0, 1.0, 50.0]),
+            args=(k,),
+        )
+        assert half[k] == pytest.approx(best.cost, abs=1e-6)
 
 
 def test_a_bound_is_said_and_has_no_deviation() -> None:

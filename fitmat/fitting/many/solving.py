@@ -22,6 +22,13 @@ from fitmat.maths.programs import program_run_often
 TOLERANCE = 1e-2 * RTOL
 """Of the steps: a hundredth of a single fit's, so that what is between the two is mostly that one's last step."""
 
+PATIENCE = 24
+"""Looks after which a fit is given up that is far behind another start of its surface, which has ended: on the way to a
+bound it would take hundreds more, for nothing."""
+
+BEHIND = 10.0
+"""How far: in the log-likelihood; of an objective, twice the other's squares."""
+
 NEWTON = 3
 """Newton steps of the discrepancy between two bursts: all bursts together settle it."""
 
@@ -92,7 +99,8 @@ def solve_many(
     numbers = jnp.zeros(many + 1)
     none = Ends(jnp.zeros((many + 1, k)), numbers, numbers, jnp.zeros(many + 1, bool), jnp.zeros(many + 1, int))
     begun = work.filled(work.empty(block), jnp.ones(block, bool), jnp.array(0))
-    _, _, found = jax.lax.while_loop(lambda state: jnp.any(work.busy(state[0])), work.passed, (*begun, none))
+    best = jnp.full(len(work.samples.x), -jnp.inf)
+    found = jax.lax.while_loop(lambda state: jnp.any(work.busy(state[0])), work.passed, (*begun, none, best))[2]
     return tuple(part[:many] for part in found)
 
 
@@ -115,9 +123,12 @@ class _Work(NamedTuple):
         """Which lanes have a fit."""
         return at.fit < len(self.starts)
 
-    def passed(self, state: tuple[_Block, Array, Ends]) -> tuple[_Block, Array, Ends]:
-        """A few steps of every lane; what has ended is noted, and the next fits take its place."""
-        at, following, found = state
+    def passed(self, state: tuple[_Block, Array, Ends, Array]) -> tuple[_Block, Array, Ends, Array]:
+        """A few steps of every lane; what has ended is noted, and the next fits take its place.
+
+        The last of the state is the best log-likelihood in which a fit of each surface ended.
+        """
+        at, following, found, best = state
         at = jax.lax.fori_loop(0, BURST, lambda _, at: self.stepped(at), at)
         normal, solved = at.state.here[0], at.state.settled
         settled, steady, after = jnp.ones_like(solved), self.steady(normal), at
@@ -129,10 +140,19 @@ class _Work(NamedTuple):
             state = _begun_again(at.state, at.u, ~(settled & solved), at.state.damping)
             after = at._replace(s=s, measured=self.transformed(at.data, s), state=state)
         done = (settled & solved) | ~jnp.isfinite(normal.square) | (at.steps >= self.most)
+        surface = self.of[jnp.minimum(at.fit, len(self.starts) - 1)]
+        ended_there = done & self.busy(at) & jnp.isfinite(score)
+        best = best.at[surface].max(jnp.where(ended_there, score, -jnp.inf))
+        done |= (at.steps >= PATIENCE) & self.is_behind(score, best[surface])
         row = jnp.where(done, at.fit, len(self.starts))
         ended = (at.u.T, after.s, score, settled & (solved | steady), at.steps)
         found = Ends(*(whole.at[row].set(part) for whole, part in zip(found, ended, strict=True)))
-        return *self.filled(after, done | ~self.busy(at), following), found
+        return *self.filled(after, done | ~self.busy(at), following), found, best
+
+    def is_behind(self, score: Float[Array, " B"], best: Float[Array, " B"]) -> Bool[Array, " B"]:
+        """Which log-likelihoods are far below the best, where one is known."""
+        far = BEHIND if self.shared.loss.posterior else jnp.abs(best)
+        return jnp.isfinite(best) & (score < best - far)
 
     def stepped(self, at: _Block) -> _Block:
         """One step of every lane that moves."""

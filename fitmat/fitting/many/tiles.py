@@ -21,8 +21,11 @@ from fitmat.maths.parts import slices
 from fitmat.models.parameters import vector
 from fitmat.text import brief
 
-SIZES = (256, 1024, 8192)
+SIZES = (256, 1024, 4096)
 """Surfaces that a call takes."""
+
+EACH = 2
+"""Calls that each thread should have at least, so that none waits long for another."""
 
 MOST_NUMBERS = 1 << 23
 """Numbers of an array with an entry for each surface of a call and each sample, or each node of the grid."""
@@ -60,7 +63,9 @@ class Work:
         rows, channels = len(self.shared.wi), self.shared.channels
         most = MOST_NUMBERS // max(rows * channels, len(self.known.dark))
         usable = [size for size in SIZES if size <= most] or SIZES[:1]
-        return next((size for size in usable if size * threads >= surfaces), usable[-1])
+        if jax.default_backend() != "cpu":
+            return next((size for size in usable if size * threads >= surfaces), usable[-1])
+        return next((size for size in reversed(usable) if size * threads * EACH <= surfaces), usable[0])
 
     def block(self, size: int) -> int:
         """Fits side by side, of a tile of such a size."""
