@@ -7,6 +7,7 @@ import dataclasses
 import hashlib
 import json
 import os
+import re
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -20,6 +21,9 @@ from fitmat.text import visible
 
 PARTS = "parts"
 """Folder in a batch's folder of what is kept to go on, by key."""
+
+_PART = re.compile(r"[0-9a-f]{32}\.(json|npz)")
+"""Names of files in it."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,7 +98,7 @@ def claimed(folder: Path, of: Mapping[str, str], names: Sequence[str], *, force:
     Raises:
         OutputError: they would be lost, or a file of such a name is of no batch.
     """
-    before = _earlier(folder)
+    before = _earlier(folder) or _unrecorded(folder, names)
     for name in names:
         if name not in before.files and os.path.lexists(folder / name):
             why = f"{folder / name} is not known to be of an earlier batch, and is not replaced"
@@ -106,17 +110,27 @@ def claimed(folder: Path, of: Mapping[str, str], names: Sequence[str], *, force:
     return Claim(folder, before, of)
 
 
-def _earlier(folder: Path) -> Record:
-    """What a batch left; an empty record where none did."""
+def _earlier(folder: Path) -> Record | None:
+    """What a batch left; None where there is no record."""
     try:
         found = json.loads((folder / BATCH).read_text(encoding="utf-8"))
         known = ([name for name in found.get(key, ()) if Path(name).name == name] for key in ("files", "parts", "runs"))
         return Record(dict(found["of"]), *known)
     except FileNotFoundError:
-        return Record({}, (), ())
+        return None
     except (OSError, ValueError, LookupError, TypeError) as error:
         why = f"{folder / BATCH} is no record of a batch, and is not replaced"
         raise OutputError(f"{why}; move it, or give another --out DIR.") from error
+
+
+def _unrecorded(folder: Path, names: Sequence[str]) -> Record:
+    """What a batch of a fitmat without records left, which is of unknown data; nothing where anything else is there."""
+    there = [path.name for path in folder.iterdir() if not path.name.startswith(files.WORK)]
+    parts = os.listdir(folder / PARTS) if (folder / PARTS).is_dir() else []
+    if not parts or not {PARTS, *names}.issuperset(there) or not all(map(_PART.fullmatch, parts)):
+        return Record({}, (), ())
+    results = [name for name in there if name != PARTS]
+    return Record(dict.fromkeys(results, ""), results, parts)
 
 
 def _lost(before: Record, of: Mapping[str, str]) -> list[str]:

@@ -31,8 +31,8 @@ from fitmat.fitting.many.sharing import refuse_idle, sharing, told_together
 from fitmat.maths.parts import slices
 from fitmat.text import brief
 
-RESULT = "texture"
-"""Name of the file of all points, which ends in .npz or .zarr."""
+RESULTS = ("texture.npz", f"texture{ZARR}")
+"""Names of the file of all points."""
 
 TILE = 16384
 """Points that are fitted, and kept, at a time."""
@@ -104,11 +104,11 @@ def fit_texture(
     shared, held = shared_by_all([atlas.wi, atlas.wo], len(atlas.channels), model, *given)
     axes, count = atlas.points, int(np.prod(atlas.points))
     refuse_idle(names, shared, held, axes)
-    name = f"{RESULT}{ZARR if suffix == ZARR else '.npz'}"
+    name = RESULTS[suffix == ZARR]
     with files.alone(target):
         keys = [_key(atlas, *atlas.tile(part), model, told) for part in slices(count, TILE)]
         of = {name: record.digest([axes, atlas.channels, keys, *([sorted(names.smooth)] if names.smooth else [])])}
-        claim = record.claimed(target, of, (name, *MAPS), force=force)
+        claim = record.claimed(target, of, (*RESULTS, *MAPS), force=force)
         each, words = [], f"fitting {count} points"
         say(words, 0, count)
         for part, key in zip(slices(count, TILE), keys, strict=True):

@@ -136,6 +136,11 @@ def test_another_batch_takes_no_rows_away(scans: Path, tmp_path: Path, monkeypat
     assert (out / "results.parquet").read_bytes() == before
     assert len(fm.batch(one, out, "lambert", force=True).table) == 1
     assert len(list((out / "parts").iterdir())) == 1
+    (out / "batch.json").unlink()  # as of a fitmat that wrote none
+    with pytest.raises(OutputError, match=r"out holds results .* or --force to replace them"):
+        fm.batch(one, out, "ggx")
+    assert len(fm.batch(one, out, "ggx", force=True).table) == 1
+    assert len(list((out / "parts").iterdir())) == 1
     (tmp_path / "own").mkdir()
     (tmp_path / "own" / "index.html").write_text("mine")
     with pytest.raises(OutputError, match=r"index\.html is not known to be of an earlier batch"):

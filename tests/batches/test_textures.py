@@ -184,6 +184,25 @@ def test_a_texture_replaces_no_file_of_the_user(atlas: Path, tmp_path: Path) -> 
         fit_texture(atlas, tmp_path, **TOLD)
 
 
+def test_what_a_fitmat_without_records_left_is_replaced_by_force(atlas: Path, tmp_path: Path) -> None:
+    """It wrote no batch.json; where one file is of another name nothing is replaced, nor where parts are none."""
+    out, group = tmp_path / "out", zarr_group(tmp_path / "atlas.zarr")
+    fit_texture(atlas, out, **TOLD)
+    (out / "batch.json").unlink()
+    with pytest.raises(OutputError, match=r"out holds results of other data.* and 5 more\), which would .* or --force"):
+        fit_texture(group, out, loss="gaussian")
+    for mine in (out / "notes.txt", out / "parts" / "notes.npz"):
+        mine.write_text("mine")
+        before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+        with pytest.raises(OutputError, match=r"texture\.npz is not known to be of an earlier batch"):
+            fit_texture(group, out, loss="gaussian", force=True)
+        assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+        mine.unlink()
+    fit_texture(group, out, loss="gaussian", force=True)
+    assert {path.name for path in out.iterdir()} - set(MAPS) == {"texture.zarr", "parts", "batch.json"}
+    assert len(list((out / "parts").iterdir())) == 1
+
+
 def test_maps_hold_the_parameters(atlas: Path, tmp_path: Path) -> None:
     """Of glTF 2.0, sections 3.9.2 and 5.22.2, and IEC 61966-2-1: sRGB colours, roughness √α in green."""
     found = fit_texture(atlas, tmp_path / "out", **TOLD)
