@@ -1,10 +1,10 @@
 """Smoothness: numbers on a grid, each known with an error of its own, and what neighbours tell of one another.
 
 y_i ~ N(x_i, σ_i²), and the differences d of neighbours have the density of Student's t with ν degrees of freedom and
-scale τ, up to one factor of all: τ^(1−n) for n points, as only differences count. Each edge has a weight
+scale τ, up to one factor of all: τ^(k−n) for n points in k pieces, as only differences count. Each edge has a weight
 w ~ Γ(ν/2, ν/2) given which d ~ N(0, τ²/w) (K. Lange, R. Little and J. Taylor, J. Am. Stat. Assoc. 84 (1989) 881); and
-a share π of the edges is cut: there two materials meet, and d may be anything within the width of the data. The
-posterior is taken as a product of a normal density of x and one of each edge (variational Bayes: C. Bishop, Pattern
+a share π of the edges is cut: there two materials meet, and |d| may be anything up to the range of the data and 2 σ.
+The posterior is taken as a product of a normal density of x and one of each edge (variational Bayes: C. Bishop, Pattern
 Recognition and Machine Learning, Springer 2006, sec. 10.1), so that an edge's weight is (ν + 1)/(ν + ⟨d²⟩/τ²), times
 the probability that it is not cut, which both densities of d give where d² is ⟨d²⟩. π is the mean of that of all, and τ
 where the bound on the evidence, times τ, is greatest: the factor keeps it from 0 (Y. Chung et al., Psychometrika 78
@@ -26,11 +26,11 @@ FREEDOM = 2.0
 STUDENT = math.gamma(0.5 * (FREEDOM + 1.0)) / math.gamma(0.5 * FREEDOM) / math.sqrt(FREEDOM * math.pi)
 """Density of Student's t at 0, of scale 1."""
 
-CUT = 1e-2, 1e-12
-"""π to begin with, and the least."""
+CUT = 1e-2, 1e-12, 0.5
+"""π to begin with, the least, and the most."""
 
 LEAST = 1e-6
-"""Weight of an edge, so that all points hang together."""
+"""Probability that an edge is not cut, at least, so that all points hang together."""
 
 EXACT = 64, 1024
 """Points of the shorter and of the longer side up to which variances are exact; of larger grids they are from draws."""
@@ -44,7 +44,7 @@ MOST_DRAWS = 128
 DRAWN = 1 << 26
 """Points × draws at the end, where that is more than the least."""
 
-ROUNDS = 80
+ROUNDS = 50
 """Most looks at the field."""
 
 STILL = 2e-3
@@ -99,7 +99,8 @@ def smoothness(found: Float[np.ndarray, "rows columns"], sd: Float[np.ndarray, "
     look: Look = draws or (lambda lattice: eliminated(lattice, y))
     edges = [np.zeros(y.shape), np.zeros(y.shape)]
     edges[0][:, :-1], edges[1][:-1] = 1.0, 1.0
-    first, width = _first(y, used, precision), float(np.ptp(found[used]) + np.median(sd[used]))
+    width = 2.0 * float(np.ptp(found[used]) + 2.0 * np.median(sd[used]))
+    first = _first(y, used, precision)
     lattice, moments, square, cut = _learnt(look, precision, edges, first, width)
     if draws is not None:
         moments = draws.closer(lattice)
@@ -160,24 +161,26 @@ def _learnt(
 ) -> tuple[Lattice, Moments, float, float]:
     """The lattice, the moments, τ² and π at which weights stay.
 
-    At the greatest bound Σ c d̄² + 2 is the number of parameters that the data determine, tr(Q⁻¹ P); the simple step
+    At the greatest bound Σ c d̄² + k + 1 is the number of parameters that the data determine, tr(Q⁻¹ P); the simple step
     towards it is D. MacKay's, Neural Comput. 4 (1992) 415, made longer by what the last one did.
     """
-    weights, before, cut = edges, None, CUT[0]
+    weights, before, cut, pieces = edges, None, CUT[0], 1
     lattice = Lattice(precision, *(w / square for w in weights))
     moments = look(lattice)
     for _ in range(ROUNDS):
         across, along = _squares(moments.mean)
         rough = float(np.sum(lattice.right * across) + np.sum(lattice.down * along))
         determined = float(np.sum(moments.variance * precision))
-        change = float(np.log((rough + NO_LESS) / (max(determined - 2.0, 0.0) + NO_LESS)))
+        change = float(np.log((rough + NO_LESS) / (max(determined - pieces - 1.0, 0.0) + NO_LESS)))
         here, longer = np.log(square), 1.0
         if before is not None and here != before[0]:
             slope = (change - before[1]) / (here - before[0])
             longer = LONGEST if slope >= 0 else float(np.clip(-1.0 / slope, 1.0, LONGEST))
         before = here, change
         moved = float(np.exp(np.clip(longer * change, -FARTHEST, FARTHEST)))
-        new, cut = _weights(_mean_squares(moments), edges, square * moved, cut, width)
+        new, cuts = _weights(_mean_squares(moments), edges, square * moved, cut, width)
+        whole = np.concatenate([part[e > 0] for part, e in zip(cuts, edges, strict=True)])
+        cut, pieces = float(np.clip(np.mean(whole), *CUT[1:])), _pieces(cuts, precision > 0)
         shift = [np.log(a[e > 0] / b[e > 0]) for a, b, e in zip(new, weights, edges, strict=True)]
         if max(abs(change), float(np.sqrt(np.mean(np.concatenate(shift) ** 2)))) < STILL:
             break
@@ -189,13 +192,31 @@ def _learnt(
 
 def _weights(
     mean_squares: Sequence[np.ndarray], edges: Sequence[np.ndarray], square: float, cut: float, width: float
-) -> tuple[list[np.ndarray], float]:
-    """The weights of edges, 0 of what is none, and the share of them that is cut."""
-    weights, probabilities = [], []
+) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """The weights of edges, 0 of what is none, and the probabilities that they are cut."""
+    weights, cuts = [], []
     for part, edge in zip(mean_squares, edges, strict=True):
         spread = 1.0 + part / (FREEDOM * square)
         density = STUDENT / np.sqrt(square) * spread ** (-0.5 * (FREEDOM + 1.0))
         probability = cut / (cut + (1.0 - cut) * width * density)
-        weights.append(edge * np.maximum((1.0 - probability) * (FREEDOM + 1.0) / (FREEDOM * spread), LEAST))
-        probabilities.append(probability[edge > 0])
-    return weights, max(float(np.mean(np.concatenate(probabilities))), CUT[1])
+        weights.append(edge * np.maximum(1.0 - probability, LEAST) * (FREEDOM + 1.0) / (FREEDOM * spread))
+        cuts.append(probability)
+    return weights, cuts
+
+
+def _pieces(cuts: Sequence[np.ndarray], used: np.ndarray) -> int:
+    """How many pieces with data the edges leave that are rather not cut."""
+    right, down = (part < 0.5 for part in cuts)
+    if right[:, :-1].all() and down[:-1].all():
+        return 1
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    number = np.arange(used.size).reshape(used.shape)
+    ends = (
+        (number[:, :-1][right[:, :-1]], number[:, 1:][right[:, :-1]]),
+        (number[:-1][down[:-1]], number[1:][down[:-1]]),
+    )
+    place = tuple(np.concatenate(part) for part in zip(*ends, strict=True))
+    graph = coo_array((np.ones(len(place[0]), bool), place), shape=(used.size, used.size))
+    return len(np.unique(connected_components(graph, directed=False)[1][used.ravel()]))

@@ -44,7 +44,7 @@ def test_the_posterior_is_that_of_its_definition() -> None:
     """By the inverse of the whole matrix, on 6 × 7 points with holes; and weights and scale solve their equations."""
     rng = np.random.default_rng(1)
     sd = rng.uniform(0.2, 1.0, (6, 7))
-    y = drawn((6, 7), 1.0, rng) + np.where(np.arange(7) > 3, 6.0, 0.0) + sd * rng.normal(size=(6, 7))
+    y = drawn((6, 7), 1.0, rng) + np.where(np.arange(7) > 3, 30.0, 0.0) + sd * rng.normal(size=(6, 7))
     y[2:4, 1:3], sd[0, 5] = np.nan, np.nan
     found = smoothness(y, sd)
     used = np.isfinite(y) & np.isfinite(sd)
@@ -57,13 +57,14 @@ def test_the_posterior_is_that_of_its_definition() -> None:
     square = found.scale**2
     expected = (d @ mean) ** 2 + np.einsum("ei,ij,ej->e", d, covariance, d)
     student = stats.t.pdf(np.sqrt(expected), FREEDOM, scale=found.scale) * (1.0 - found.cut)
-    uniform = found.cut / (np.ptp(y[used]) + np.median(sd[used]))
+    uniform = found.cut / (2.0 * (np.ptp(y[used]) + 2.0 * np.median(sd[used])))
     off = np.log(c * square * (FREEDOM + expected / square) / (FREEDOM + 1.0) * (1.0 + uniform / student))
     assert found.cut == pytest.approx(np.mean(uniform / (uniform + student)), rel=0.02)
+    assert found.cut == pytest.approx(6 / (6 * 6 + 5 * 7), rel=0.1)
     assert np.sqrt(np.mean(off**2)) < 1.1 * STILL
-    # d/d ln τ of −(n − 1) ln τ + ln τ − ½ Σ c ⟨d²⟩ is 0.
+    # d/d ln τ of −(n − 2) ln τ + ln τ − ½ Σ c ⟨d²⟩ is 0: there are two materials.
     determined = np.sum(precision * np.diag(covariance))
-    assert np.sum(c * (d @ mean) ** 2) == pytest.approx(determined - 2.0, rel=3.0 * STILL, abs=0.02)
+    assert np.sum(c * (d @ mean) ** 2) == pytest.approx(determined - 3.0, rel=3.0 * STILL, abs=0.02)
 
 
 @pytest.mark.parametrize(("noise", "jump"), [(0.5, 0.0), (1.0, 8.0), (3.0, 0.0)])
@@ -159,6 +160,19 @@ def test_a_constant_field_is_averaged(shape: tuple[int, int]) -> None:
     assert np.mean(found.sd**2) == pytest.approx(expected, rel=0.1)
     assert np.mean((found.mean - 2.0) ** 2) < 2.0 * expected
     assert expected < 0.25 * 30.0 / y.size
+
+
+@pytest.mark.parametrize("far", [100.0, 1e6])
+def test_a_single_point_that_is_far_off_leaves_the_others_alone(far: float) -> None:
+    """As of a fit that ended at another optimum: it stays, and what is known of the others is as without it."""
+    rng = np.random.default_rng(12)
+    y = rng.normal(size=(30, 30))
+    without = np.where(np.arange(900).reshape(30, 30) == 400, np.nan, y)
+    found, expected = (smoothness(one, np.ones(y.shape)) for one in (np.where(np.isnan(without), far, y), without))
+    there = np.isfinite(without)
+    np.testing.assert_allclose(found.mean[there], expected.mean[there], atol=0.1)
+    assert np.mean(found.sd[there]) == pytest.approx(np.mean(expected.sd[there]), rel=0.25)
+    assert found.mean[~there] == pytest.approx(far, abs=0.1)
 
 
 def test_a_hole_is_inferred() -> None:
