@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float
 
 from fitmat.colour.spaces import encoded
 from fitmat.exports import gltf
+from fitmat.exports.materialx.elements import SRGB, Inputs, element, file, whole
 from fitmat.fitting.many.fits import Fits
 from fitmat.models.terms.fresnel import eta_from_f0, f0_from_eta
 
@@ -20,6 +21,9 @@ SCENE, NODES = "texture.gltf", "texture.mtlx"
 
 MAPS = (BASE, ROUGH, SPECULAR, SCENE, NODES)
 """All of them."""
+
+PICTURES = (("base", SRGB, BASE), ("packed", "filename", ROUGH), ("specular", SRGB, SPECULAR))
+"""MaterialX's node of each picture, its kind, and its file."""
 
 LEVELS = 255.0
 """Of a picture's channel."""
@@ -127,36 +131,16 @@ def _scene(most: float) -> str:
 
 def _nodes(most: float) -> str:
     """The same material by MaterialX's node of it; a picture's first row is at v = 1 there."""
-    return f"""<?xml version="1.0"?>
-<!--
-{ABOUT[0]}
--->
-<materialx version="1.39" colorspace="lin_rec709">
-  <image name="base" type="color3">
-    <input name="file" type="filename" value="{BASE}" colorspace="srgb_texture" />
-  </image>
-  <image name="packed" type="color3">
-    <input name="file" type="filename" value="{ROUGH}" />
-  </image>
-  <extract name="rough" type="float">
-    <input name="in" type="color3" nodename="packed" />
-    <input name="index" type="integer" value="1" />
-  </extract>
-  <image name="specular" type="color3">
-    <input name="file" type="filename" value="{SPECULAR}" colorspace="srgb_texture" />
-  </image>
-  <gltf_pbr name="surface" type="surfaceshader">
-    <input name="base_color" type="color3" nodename="base" />
-    <input name="metallic" type="float" value="0" />
-    <input name="roughness" type="float" nodename="rough" />
-    <input name="specular_color" type="color3" nodename="specular" />
-    <input name="ior" type="float" value="{_index(most)!r}" />
-  </gltf_pbr>
-  <surfacematerial name="material" type="material">
-    <input name="surfaceshader" type="surfaceshader" nodename="surface" />
-  </surfacematerial>
-</materialx>
-"""
+    channel: Inputs = {"in": ("color3", "packed"), "index": ("integer", 1)}
+    surface: Inputs = {"base_color": ("color3", "base"), "metallic": ("float", 0.0), "roughness": ("float", "rough")}
+    surface |= {"specular_color": ("color3", "specular"), "ior": ("float", _index(most))}
+    nodes = (
+        *(("image", name, {"file": (kind, path)}) for name, kind, path in PICTURES),
+        ("extract", "rough", channel),
+        ("gltf_pbr", "surface", surface),
+        ("surfacematerial", "material", {"surfaceshader": ("surfaceshader", "surface")}),
+    )
+    return file(ABOUT[0], whole("".join(element(*node) for node in nodes)))
 
 
 def _index(f0: float) -> float:

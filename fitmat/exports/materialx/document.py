@@ -6,13 +6,13 @@ It runs nothing: `materialx_shader` does.
 import dataclasses
 from collections.abc import Sequence
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from fitmat.errors import ModelError
 from fitmat.exports.closest import Closest, closest, coloured
 from fitmat.exports.material import Chosen
+from fitmat.exports.materialx.elements import Inputs, element, file, whole
 from fitmat.exports.materialx.models import Compensated, RoughDiffuse, template
 from fitmat.models.base import AbstractBRDF, Sum
 from fitmat.models.lobes.kulla_conty import KullaConty
@@ -33,12 +33,6 @@ SAME, FRESNELS = (Lambert, OrenNayar), (Dielectric, Schlick, F82, Conductor)
 
 TURNED = "turned"
 """Instead of a type: the tangent, turned by so many degrees."""
-
-LINKED = ("BSDF", "surfaceshader", "vector3")
-"""Types of which a text is the name of a node."""
-
-Inputs = dict[str, tuple[str, Any]]
-"""Name of an input → its type and value."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -160,8 +154,7 @@ def facts(document: Document) -> dict[str, Any]:
 def texts(name: str, header: Sequence[str], document: Document) -> dict[str, str]:
     """File names → texts; the material is called `material`."""
     lines = [*header, *(document.found.intervals if document.found is not None else [])]
-    comment = "\n".join(line.replace("--", "-\\u002d") for line in lines)
-    return {f"{name}.mtlx": f'<?xml version="1.0"?>\n<!--\n{comment}\n-->\n{xml(document)}'}
+    return {f"{name}.mtlx": file("\n".join(lines), xml(document))}
 
 
 def xml(document: Document) -> str:
@@ -171,15 +164,15 @@ def xml(document: Document) -> str:
         names.append(f"lobe{k + 1}")
         turned, inputs = _turned(f"tangent{k + 1}", given)
         parts += turned
-        parts += _element(category, names[-1] if category != "open_pbr_surface" else "surface", inputs)
+        parts += element(category, names[-1] if category != "open_pbr_surface" else "surface", inputs)
     for k in range(1, len(names)):
         top = names[0] if k == 1 else f"sum{k - 1}"
-        parts += _element("add", f"sum{k}", {"in1": ("BSDF", top), "in2": ("BSDF", names[k])})
+        parts += element("add", f"sum{k}", {"in1": ("BSDF", top), "in2": ("BSDF", names[k])})
     if document.nodes[0][0] != "open_pbr_surface":
-        whole = names[0] if len(names) == 1 else f"sum{len(names) - 1}"
-        parts += _element("surface", "surface", {"bsdf": ("BSDF", whole)})
-    parts += _element("surfacematerial", "material", {"surfaceshader": ("surfaceshader", "surface")})
-    return f'<materialx version="1.39" colorspace="lin_rec709">\n{parts}</materialx>\n'
+        added = names[0] if len(names) == 1 else f"sum{len(names) - 1}"
+        parts += element("surface", "surface", {"bsdf": ("BSDF", added)})
+    parts += element("surfacematerial", "material", {"surfaceshader": ("surfaceshader", "surface")})
+    return whole(parts)
 
 
 def _turned(name: str, inputs: Inputs) -> tuple[str, Inputs]:
@@ -189,26 +182,5 @@ def _turned(name: str, inputs: Inputs) -> tuple[str, Inputs]:
     world: Inputs = {"space": ("string", "world")}
     ends: Inputs = {"in": ("vector3", f"{name}_along"), "amount": ("float", -inputs["tangent"][1])}
     ends["axis"] = "vector3", f"{name}_normal"
-    parts = _element("tangent", f"{name}_along", world) + _element("normal", f"{name}_normal", world)
-    return parts + _element("rotate3d", name, ends), inputs | {"tangent": ("vector3", name)}
-
-
-KINDS = {"surfacematerial": "material", "surface": "surfaceshader", "open_pbr_surface": "surfaceshader"}
-KINDS |= dict.fromkeys(("tangent", "normal", "rotate3d"), "vector3")
-"""Category → its type, where it is no BSDF."""
-
-
-def _element(category: str, name: str, inputs: Inputs) -> str:
-    inner = "".join(_input(key, kind, value) for key, (kind, value) in inputs.items())
-    kind = KINDS.get(category, "BSDF")
-    return f"  <{category} name={quoteattr(name)} type={quoteattr(kind)}>\n{inner}  </{category}>\n"
-
-
-def _input(name: str, kind: str, value: Any) -> str:
-    if isinstance(value, str):
-        said = f"nodename={quoteattr(value)}" if kind in LINKED else f"value={quoteattr(value)}"
-    else:
-        count = {"color3": 3, "vector2": 2}.get(kind, 1)
-        numbers = np.broadcast_to(np.ravel(np.asarray(value, float)), (count,))
-        said = f'value="{", ".join(repr(float(x)) for x in numbers)}"'
-    return f"    <input name={quoteattr(name)} type={quoteattr(kind)} {said} />\n"
+    parts = element("tangent", f"{name}_along", world) + element("normal", f"{name}_normal", world)
+    return parts + element("rotate3d", name, ends), inputs | {"tangent": ("vector3", name)}
