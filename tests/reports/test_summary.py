@@ -101,11 +101,15 @@ addEventListener("load", async () => {
   };
   const words = () => [document.getElementById("drawn").textContent, document.getElementById("scatter").ariaLabel
     ?? document.getElementById("scatter").getAttribute("aria-label")];
-  const found = {offered: [...document.getElementById("across").options].map((one) => one.value), first: words()};
+  const wrong = [];
+  addEventListener("error", (event) => wrong.push(event.message));
+  const found = {wrong, offered: [...document.getElementById("across").options].map((one) => one.value), first: words()};
   await later();
   found.points = await all();
-  const up = document.getElementById("up");
-  up.value = "seconds"; up.dispatchEvent(new Event("change"));
+  for (const [id, name] of [["up", "alpha"], ["across", "seconds"]]) {
+    const choice = document.getElementById(id);
+    choice.value = name; choice.dispatchEvent(new Event("change"));
+  }
   await later();
   found.other = [words(), await all()];
   const filter = document.getElementById("filter");
@@ -129,13 +133,14 @@ def test_any_number_is_drawn_against_any_other() -> None:
     files = [
         line(
             "a.csv",
-            columns={"alpha": 0.1, "alpha_low": 0.05, "alpha_high": 0.2, "misfit_over_noise": 1.0, "seconds": 1},
+            columns={"alpha": 0.1, "alpha_low": 0.05, "alpha_high": 0.2, "misfit_over_noise": 1.0, "seconds": 0.0121},
         ),
-        line("b.csv", columns={"alpha": 0.3, "misfit_over_noise": 2.0, "seconds": 1000.0}),
-        line("c.csv", columns={"alpha": 0.4, "seconds": 3, "misfit_over_noise": float("nan"), "same": 5}),
+        line("b.csv", columns={"alpha": 0.3, "misfit_over_noise": 2.0, "seconds": 0.9}),
+        line("c.csv", columns={"alpha": 0.4, "seconds": 0.3, "misfit_over_noise": float("nan"), "same": 5}),
     ]
     page = re.sub(r'<meta http-equiv="Content-Security-Policy"[^>]*>', "", summary.to_html(files, []))
     found = json.loads(browser.written(page.replace("</body>", POINTED + "</body>"), chromium))
+    assert found["wrong"] == []
     assert found["offered"] == ["alpha", "misfit_over_noise", "seconds"]  # what never differs cannot be drawn
     assert found["first"][0] == "2 of 3 files have both numbers."
     assert found["first"][1].startswith("misfit_over_noise against alpha of 2 files")
@@ -143,6 +148,10 @@ def test_any_number_is_drawn_against_any_other() -> None:
         "a.csv: alpha 0.1 (0.05 to 0.2), misfit_over_noise 1",
         "b.csv: alpha 0.3, misfit_over_noise 2",
     ]
-    assert found["other"][0][1].startswith("seconds (logarithmic) against alpha of 3 files")
-    assert [text.split(", ")[1] for text in found["other"][1]] == ["seconds 1", "seconds 1000", "seconds 3"]
-    assert found["cut"] == ["1 of 1 files have both numbers.", ["b.csv: alpha 0.3, seconds 1000"]]
+    assert found["other"][0][1].startswith("alpha against seconds (logarithmic) of 3 files")
+    assert [text.split(": ")[1].split(",")[0] for text in found["other"][1]] == [
+        "seconds 0.0121",
+        "seconds 0.9",
+        "seconds 0.3",
+    ]
+    assert found["cut"] == ["1 of 1 files have both numbers.", ["b.csv: seconds 0.9, alpha 0.3"]]

@@ -30,6 +30,14 @@
     return {log, range: log ? [least / room, most * room] : [least - room, most + room]};
   }
 
+  /* Of a logarithmic axis: powers of ten; of less than four decades also 2 and 5. */
+  function powers(u, axis, least, most) {
+    const found = [], leads = most / least < 1e4 ? [1, 2, 5] : [1];
+    for (let power = Math.floor(Math.log10(least)); power <= Math.log10(most); power++)
+      for (const lead of leads) found.push(Number(`${lead}e${power}`));
+    return found.filter((tick) => tick >= least && tick <= most);
+  }
+
   function draw() {
     const [across, up] = chosen.map((select) => select.value), [x, y] = [looked(across), looked(up)];
     points = rows.map((row, k) => ({row, name: data.names[k], x: x(k), y: y(k)}))
@@ -51,7 +59,7 @@
       width: Math.max(place.clientWidth, 200), height: 360, legend: {show: false},
       series: [{}, {paths: () => null, points: {show: false}}],
       scales: {x: scale(scales[0]), y: scale(scales[1])},
-      axes: [{...axis, label: words[0], size: 30}, {...axis, label: words[1], size: 60}],
+      axes: scales.map(({log}, k) => ({...axis, label: words[k], size: [30, 60][k], splits: log ? powers : undefined, filter: (u, ticks) => ticks})),
       cursor: {drag: {x: false, y: false}, x: false, y: false, points: {show: false}},
       hooks: {draw: [marked], setCursor: [meant]},
     }, [points.map((point) => point.x.value), points.map((point) => point.y.value)], place);
