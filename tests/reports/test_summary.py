@@ -103,7 +103,8 @@ addEventListener("load", async () => {
     ?? document.getElementById("scatter").getAttribute("aria-label")];
   const wrong = [];
   addEventListener("error", (event) => wrong.push(event.message));
-  const found = {wrong, offered: [...document.getElementById("across").options].map((one) => one.value), first: words()};
+  const offered = [...document.getElementById("across").options].map((one) => one.value);
+  const found = {wrong, offered, first: words()};
   await later();
   found.points = await all();
   for (const [id, name] of [["up", "alpha"], ["across", "seconds"]]) {
