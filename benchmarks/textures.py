@@ -2,9 +2,10 @@
 
 Points of one channel, 64 samples each at the same directions, 2 % noise that is known, four parameters. A sample of the
 points is fitted by `fitmat.fit` one by one, and must agree; another by `scipy.optimize.least_squares`, one process for
-each core, from one start. Ours is compiled and warm, and includes starts, standard deviations and outcomes.
+each core, from one start. Ours is compiled and warm, and includes starts, standard deviations and outcomes. With
+`--precision double single` both take turns, and it says how far apart they end, in standard deviations.
 
-Run: python benchmarks/textures.py [--points 1000 10000 100000] [--repeats 3]
+Run: python benchmarks/textures.py [--points 1000 10000 100000] [--repeats 3] [--precision double single]
 """
 
 import argparse
@@ -12,7 +13,9 @@ import multiprocessing
 import os
 import resource
 import time
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
+from typing import Any
 
 import jax
 import machine
@@ -87,6 +90,9 @@ def main() -> None:
     options.add_argument("--points", type=int, nargs="+", default=[1_000, 10_000, 100_000], help="sizes of textures")
     options.add_argument("--repeats", type=int, default=3, help="timed runs of each size")
     options.add_argument("--loss", nargs="+", default=["gaussian", "default"], help="losses; the first is compared")
+    options.add_argument(
+        "--precision", nargs="+", default=["double"], help="those of fm.fit_many; the first is compared"
+    )
     options.add_argument("--single", type=int, default=40, help="points that are fitted one by one")
     options.add_argument("--peer", type=int, default=400, help="points that scipy fits")
     chosen = options.parse_args()
@@ -97,19 +103,9 @@ def main() -> None:
     rows, found = [], None
     for loss in chosen.loss:
         for count in chosen.points:
-            fm.fit_many(wi, wo, value[:count], sigma=sigma[:count], loss=loss)
-            taken, busy = [], []
-            for _ in range(chosen.repeats):
-                begin = time.process_time()
-                seconds, fits = machine.clocked(
-                    lambda count=count, loss=loss: fm.fit_many(wi, wo, value[:count], sigma=sigma[:count], loss=loss)
-                )
-                taken.append(seconds)
-                busy.append(time.process_time() - begin)
+            told = {"value": value[:count], "sigma": sigma[:count], "loss": loss}
+            fits = timed(rows, f"{count} points, {loss}", chosen.precision, chosen.repeats, wi=wi, wo=wo, **told)
             found = fits if loss == chosen.loss[0] else found
-            peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-            rate, work = count / min(taken), 1e6 * min(busy) / count
-            rows.append([f"{count} points, {loss}", f"{rate:,.0f}", f"{work:.1f} µs", f"{peak:.2f} GB", str(fits)])
     machine.show(f"fastest of {chosen.repeats}", ["", "fits a second", "CPU a fit", "peak memory", ""], rows)
     assert found is not None
     agree(found, wi, wo, value, sigma, chosen.single, chosen.loss[0])
@@ -118,6 +114,33 @@ def main() -> None:
     print(
         f"scipy, {os.cpu_count()} processes: {rate:,.0f} fits a second; {np.mean(apart < 1e-3):.1%} end at our optimum"
     )
+
+
+def timed(rows: list[list[str]], what: str, precisions: Sequence[str], repeats: int, **told: Any) -> fm.Fits:
+    """A row for each precision, and of all but the first how far it ends from the first, whose fits are returned."""
+    fits = {name: fm.fit_many(**told, precision=name) for name in precisions}
+    taken, busy = ({name: [] for name in precisions} for _ in range(2))
+    for _ in range(repeats):
+        for name in precisions:
+            begin = time.process_time()
+            seconds, fits[name] = machine.clocked(lambda name=name: fm.fit_many(**told, precision=name))
+            taken[name].append(seconds)
+            busy[name].append(time.process_time() - begin)
+    peak, first = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, precisions[0]
+    for name, one in fits.items():
+        count = one.outcome.size
+        rate, work = count / min(taken[name]), 1e6 * min(busy[name]) / count
+        rows.append([f"{what}, {name}", f"{rate:,.0f}", f"{work:.1f} µs", f"{peak:.2f} GB", str(one)])
+    for name in precisions[1:]:
+        both = (fits[first].result == "converged") & (fits[name].result == "converged")
+        apart = (np.abs(fits[name].values - fits[first].values) / fits[first].sd)[both].max(axis=-1)
+        other = np.count_nonzero(fits[name].outcome != fits[first].outcome)
+        print(
+            f"{what}: {name} is {min(taken[first]) / min(taken[name]):.2f} times as fast as {first}; parameters are "
+            f"{np.median(apart):.1e} sd apart (99.9 %: {np.quantile(apart, 0.999):.1e}, most: {apart.max():.1e}), "
+            f"{other} outcomes differ"
+        )
+    return fits[first]
 
 
 def agree(

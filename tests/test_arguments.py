@@ -253,6 +253,7 @@ DOORS: dict[str, tuple[dict[str, Any], dict[str, tuple[Any, ...]]]] = {
             **dict.fromkeys(("starts", "max_steps"), (0, *WHOLE)),
             "threads": without((0, *WHOLE), NOTHING),
             **dict.fromkeys(("pool", "smooth"), POOLS),
+            "precision": (None, *TEXT, "half", "float32"),
             "progress": CALLED,
         },
     ),

@@ -85,7 +85,7 @@ def fit_texture(
         smooth: As in `fitmat.fit_many`; of a texture that is done nothing is fitted again.
         force: Replace the results of something else in the folder.
         progress: Called with what is done, how many points are done, and how many there are.
-        **told: `fixed`, `loss`, `masking`, `starts`, `max_steps` and `threads` of `fitmat.fit_many`.
+        **told: `fixed`, `loss`, `masking`, `starts`, `max_steps`, `threads` and `precision` of `fitmat.fit_many`.
 
     Raises:
         FitmatError: the atlas cannot be read, the arguments do not fit, nothing could be smoothed, results would
@@ -140,6 +140,8 @@ def _fitted(
 def _key(atlas: Atlas, value: np.ndarray, sigma: np.ndarray | float | None, model: str, told: Mapping[str, Any]) -> str:
     """The name under which a tile is kept: of what is fitted, how, and by which fitmat."""
     how = {name: given for name, given in told.items() if name != "threads"} | {"model": model}
+    if how.get("precision") == "double":
+        del how["precision"]  # as where none is told
     words = json.dumps([how, version("fitmat"), value.shape], sort_keys=True, default=str)
     found = hashlib.sha256(words.encode())
     for part in (value, np.zeros(0) if sigma is None else np.asarray(sigma), atlas.wi, atlas.wo):

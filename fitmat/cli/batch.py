@@ -26,10 +26,17 @@ from fitmat.studies import DEFAULT_MODELS
 from fitmat.text import visible
 
 TEXTURE = {
-    *("files", "lights", "out", "force", "processes", "device", "smooth"),
+    *("files", "lights", "out", "force", "processes", "device", "precision", "smooth"),
     *("models", "loss", "masking", "fix", "seed"),
 }
 """Parameters of the command that a texture takes; without draws the seed is of no consequence."""
+
+TEXTURE_ONLY = {
+    "device": ("cpu", "a texture (.npz, .zarr)", "files are fitted on the CPU"),
+    "precision": ("double", "a texture (.npz, .zarr)", "files are fitted in double precision"),
+    "smooth": (None, "a texture (.npz, .zarr) or --lights", "files have no neighbours"),
+}
+"""Flags for textures alone: their defaults, what they are for, and what is so of files."""
 
 MOST = 20
 """Rows that are shown; the table has all."""
@@ -51,23 +58,18 @@ def run(
         jobs: Table of what differs from file to file.
         reading: Arguments of `fitmat.read`.
         studying: Arguments of `fitmat.study`, models included.
-        doing: How many processes work side by side, or the scheduler of a cluster; the device; what to pool; what to
-            smooth; whether each file leaves a run too, and whether to replace results of something else.
+        doing: How many processes work side by side, or the scheduler of a cluster; the device and the precision; what
+            to pool and to smooth; whether each file leaves a run too, and whether to replace results of something else.
 
     Raises:
-        FitmatError: as `batch`, the device is no CPU, or files are to be smoothed.
+        FitmatError: as `batch`, or a flag is for textures.
         SystemExit: it was interrupted.
     """
     told, doing = dict(studying), dict(doing)
     models = told.pop("models")
-    if (device := doing.pop("device")) != "cpu":
-        raise FitmatError(
-            f"--device {device} for files, expected a texture (.npz, .zarr): files are fitted on the CPU."
-        )
-    if (smooth := doing.pop("smooth")) is not None:
-        raise FitmatError(
-            f"--smooth {smooth} for files, expected a texture (.npz, .zarr) or --lights: files have no neighbours."
-        )
+    for flag, (usual, wanted, why) in TEXTURE_ONLY.items():
+        if (given := doing.pop(flag)) != usual:
+            raise FitmatError(f"--{flag} {given} for files, expected {wanted}: {why}.")
     if odd := next((source for source in sources if is_texture([source])), None):
         raise FitmatError(f"{odd}: a texture beside other files, expected it alone. Give one texture at a time.")
     if doing["scheduler"] is not None:
@@ -115,8 +117,8 @@ def texture(
         folder: Where to.
         typed: Parameters that stand on the command line → their flags; those that are of no use here are refused.
         studying: Arguments of `fitmat.study`, of which a texture takes some.
-        doing: How many threads work side by side, on which device, what to smooth, and whether to replace results of
-            something else.
+        doing: How many threads work side by side, on which device and in which precision, what to smooth, and whether
+            to replace results of something else.
 
     Raises:
         FitmatError: as `fit_texture`, a flag is of no use to a texture, or there is no such device.
@@ -131,7 +133,7 @@ def texture(
     if doing["device"] == "gpu":
         process.use_gpu()
     told = {name: studying[name] for name in ("loss", "masking", "fixed")}
-    told |= {name: doing[name] for name in ("threads", "smooth", "force")}
+    told |= {name: doing[name] for name in ("threads", "precision", "smooth", "force")}
     with session.computing() as watch:
         try:
             with interrupts.raised():

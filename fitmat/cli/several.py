@@ -17,6 +17,7 @@ from fitmat.cli.flags.batch import (
     LightsFlag,
     McmcFlag,
     PoolFlag,
+    PrecisionFlag,
     ProcessesFlag,
     ReplaceBatchFlag,
     RunsFlag,
@@ -90,6 +91,7 @@ def batch(
     processes: ProcessesFlag = None,
     scheduler: SchedulerFlag = None,
     device: DeviceFlag = "cpu",
+    precision: PrecisionFlag = "double",
     pool: PoolFlag = None,
     runs: RunsFlag = False,
     smooth: SmoothFlag = None,
@@ -113,10 +115,10 @@ def batch(
     told |= {"dispersion": dispersion, "film": film, "sampling": mcmc} | fit.known(fix or [], prior or [])
     read = reading | {"instrument": instrument}
     if lights is not None or batch.is_texture(files or []):
-        doing = {"threads": processes, "device": device, "smooth": smooth, "force": force}
+        doing = {"threads": processes, "device": device, "precision": precision, "smooth": smooth, "force": force}
         return batch.texture(batch.alone(lights, files or []), out, typed(context), told, doing)
     doing = {"processes": processes, "scheduler": scheduler, "device": device, "pool": pool}
-    doing |= {"runs": runs, "smooth": smooth, "force": force}
+    doing |= {"precision": precision, "runs": runs, "smooth": smooth, "force": force}
     found = batch.run(files or [], out, jobs, read, told, doing)
     batch.show(found)
     if found.counts["refused"]:

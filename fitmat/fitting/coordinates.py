@@ -153,7 +153,8 @@ class Coordinates:
 
     def natural_of(self, u: Numbers) -> Numbers:
         """Unbounded to natural coordinates, (..., k) both."""
-        return self.low + self.span * (1.0 + library(u).sin(u)) / 2.0
+        low, span = (part.astype(u.dtype) for part in (self.low, self.span))
+        return low + span * (1.0 + library(u).sin(u)) / 2.0
 
     def bend(self, u: Array, slope: Float[Array, " k"]) -> Float[Array, " k"]:
         """What the sine adds to the second derivative of a cost of which ∂/∂u is given, where that is more than 0.

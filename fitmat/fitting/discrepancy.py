@@ -50,7 +50,7 @@ def best_discrepancy(x: Any, data: Any, start: Any, total: Total = jnp.vdot, mos
         other, other_change, other_bend, _ = along_discrepancy(x, data.noise, s, powers[1])
         change, bend = change - other_change, bend - other_bend
         pull, pull_change = _pull(z - other, data.loss)
-        known = jnp.zeros(()) if data.prior is None else (data.prior.discrepancy * s) ** 2
+        known = 0.0 if data.prior is None else (data.prior.discrepancy * s) ** 2
         first = total(data.weight, pull * change + share) + known
         second = pull_change * change**2 + pull * bend + share * (1.0 - share)
         return first, total(data.weight, second) + 2.0 * known
@@ -67,7 +67,7 @@ def best_discrepancy(x: Any, data: Any, start: Any, total: Total = jnp.vdot, mos
     def moves(state: tuple[Scalar, Scalar, Array]) -> Array:
         return jnp.any(state[1] > STILL) & (state[2] < most)
 
-    t, _, _ = jax.lax.while_loop(moves, step, (begin, jnp.ones(jnp.shape(start)), jnp.array(0)))
+    t, _, _ = jax.lax.while_loop(moves, step, (begin, jnp.ones(jnp.shape(start), begin.dtype), jnp.array(0)))
     return jnp.where(t > floor + 1e-6, jnp.exp(t), 0.0)
 
 

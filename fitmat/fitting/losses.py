@@ -6,6 +6,7 @@ Formulas only: nothing is fitted here.
 """
 
 import dataclasses
+import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
@@ -29,7 +30,7 @@ T_DOF = 4.0
 BAD_SHARE, BAD_SPREAD = 0.05, 10.0
 """In "mixture" one value in twenty is bad, with ten times the spread of the others."""
 
-_GAUSSIAN_PEAK = -0.5 * np.log(2.0 * np.pi)
+_GAUSSIAN_PEAK = float(-0.5 * np.log(2.0 * np.pi))
 
 
 def _same(r: Any) -> Any:
@@ -135,9 +136,9 @@ def _mixed(r: Any) -> Any:
     good, bad = 1.0 - BAD_SHARE, BAD_SHARE / BAD_SPREAD
     small = square < 1e-8
     safe = xp.where(small, 1.0, square)
-    logs = xp.logaddexp(np.log(good) - 0.5 * safe, np.log(bad) - 0.5 * safe / BAD_SPREAD**2)
+    logs = xp.logaddexp(math.log(good) - 0.5 * safe, math.log(bad) - 0.5 * safe / BAD_SPREAD**2)
     curvature = (good + bad / BAD_SPREAD**2) / (good + bad)
-    return r * xp.sqrt(xp.where(small, curvature, 2.0 * (np.log(good + bad) - logs) / safe))
+    return r * xp.sqrt(xp.where(small, curvature, 2.0 * (math.log(good + bad) - logs) / safe))
 
 
 _MIXED_PEAK = float(np.log((1.0 - BAD_SHARE + BAD_SHARE / BAD_SPREAD) / np.sqrt(2.0 * np.pi)))

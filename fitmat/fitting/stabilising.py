@@ -40,7 +40,7 @@ _NEAR = _near_shape()
 def _near(t: Any) -> Any:
     """The polynomial; of NumPy's arrays in place, which takes a third of the time."""
     if library(t) is not np:
-        return jnp.polyval(jnp.asarray(_NEAR), t)
+        return jnp.polyval(jnp.asarray(_NEAR, t.dtype), t)
     found = np.full_like(t, _NEAR[0])
     for coefficient in _NEAR[1:]:
         found *= t
@@ -102,7 +102,8 @@ def _traced(x: Array, noise: Array, s: Array) -> Array:
 def _stabilised_jvp(primals: tuple, tangents: tuple) -> tuple[Array, Any]:
     x, noise, s = primals
     x_dot, _, s_dot = tangents
-    value, change = _traced(x, noise, s), jnp.zeros(())
+    value = _traced(x, noise, s)
+    change = jnp.zeros((), value.dtype)
     if not isinstance(x_dot, SymbolicZero):
         change = x_dot / spread(x, noise, s)
     if not isinstance(s_dot, SymbolicZero):

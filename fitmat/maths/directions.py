@@ -109,7 +109,7 @@ def half_vector(wi: Vec3, wo: Vec3) -> Vec3:
     usable = square > 1e-24
     xp = library(square)
     safe = xp.where(usable, square, 1.0)
-    return xp.where(usable, total / xp.sqrt(safe), np.array([0.0, 0.0, 1.0]))
+    return xp.where(usable, total / xp.sqrt(safe), np.array([0.0, 0.0, 1.0], total.dtype))
 
 
 def cos_difference(wi: Vec3, wo: Vec3) -> Scalar:
@@ -184,7 +184,7 @@ _LEAST = 1e-9
 
 def mirror(directions: Float[Any, "*n 3"]) -> Float[Any, "*n 3"]:
     """The mirror directions 2(n·ω)n − ω, of one direction or of many."""
-    return directions * np.array([-1.0, -1.0, 1.0])
+    return directions * np.array([-1.0, -1.0, 1.0], directions.dtype)
 
 
 def above(wi: Vec3, wo: Vec3) -> Bool[Array, ""]:

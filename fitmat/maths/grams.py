@@ -19,6 +19,11 @@ ROUNDING = 1e-15
 """At least this fraction of the largest eigenvalue is added to the diagonal, roughly: the factor stays finite."""
 
 
+def rounding(like: Array) -> float:
+    """`ROUNDING` for numbers of the type of an array: as many units of their last place as it is of float64's."""
+    return ROUNDING * float(jnp.finfo(like.dtype).eps) / float(np.finfo(float).eps)
+
+
 @dataclasses.dataclass(frozen=True)
 class Layout:
     """Which of p parameters count in all of c columns of residuals, and which in one.

@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from fitmat.maths.grams import ROUNDING, Arrow, Layout, Normal, Whole, joined
+from fitmat.maths.grams import Arrow, Layout, Normal, Whole, joined, rounding
 
 RTOL = 1e-8
 """Relative tolerance of the steps in units of each parameter's own scale, SciPy's default; convergence is quadratic."""
@@ -173,6 +173,6 @@ def relative_offset(here: Normal, freedom: Any) -> Float[Array, ""]:
     """
     size = jnp.sqrt(here.gram.diagonal())
     scale = jnp.where(size > 0, 1.0 / jnp.where(size > 0, size, 1.0), 0.0)
-    gram = here.gram.scaled(scale).plus(jnp.full(len(size), ROUNDING * len(size)))
+    gram = here.gram.scaled(scale).plus(jnp.full(len(size), rounding(size) * len(size), size.dtype))
     along = here.slope @ (scale * gram.solve(here.slope * scale))
     return jnp.sqrt(freedom * along / jnp.maximum(here.square - along, jnp.finfo(along.dtype).tiny))

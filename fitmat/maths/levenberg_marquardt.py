@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Bool
 
-from fitmat.maths.grams import ROUNDING, Normal
+from fitmat.maths.grams import Normal, rounding
 
 FIRST_DAMPING = 1e-3
 """The first λ relative to the diagonal of JᵀJ: starts from a grid are close, and a bad step is taken back."""
@@ -70,7 +70,7 @@ class LevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         del fn, args, options, f_struct, tags
         nothing = jax.tree.map(lambda part: jnp.full(part.shape, jnp.inf, part.dtype), aux_struct)
         damping = jnp.asarray(self.damping, y.dtype)
-        return _State(y, nothing, jnp.zeros(()), damping, jnp.ones_like(y), jnp.array(0), jnp.array(False))
+        return _State(y, nothing, jnp.zeros((), y.dtype), damping, jnp.ones_like(y), jnp.array(0), jnp.array(False))
 
     def step(self, fn: Any, y: Array, args: Any, options: Any, state: _State, tags: Any) -> tuple[Array, _State, Seen]:
         """Look at the trial point, go there or not, and choose the next."""
@@ -90,7 +90,7 @@ class LevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         rounding = 16.0 * jnp.finfo(y.dtype).eps * before
         accept = first | (gain >= BAD * state.promised - rounding)
         grows = ~first & (gain >= GOOD * state.promised - rounding)
-        damping = state.damping * jnp.where(accept, jnp.where(grows, FALL, 1.0), RISE)
+        damping = state.damping * jnp.where(accept, jnp.where(grows, jnp.asarray(FALL, y.dtype), 1.0), RISE)
         new_y = jnp.where(accept, state.trial, y)
         here = jax.tree.map(lambda new, old: jnp.where(accept, new, old), seen, state.here)
         moved, size = jnp.abs(state.trial - y) / scale, jnp.abs(y) / scale
@@ -121,6 +121,6 @@ def _ahead(here: Normal, scale: Array, damping: Array) -> tuple[Array, Array]:
     """The damped step from a point, and by how much ½ Σ r² falls there where the residuals are linear."""
     unit = jnp.where(here.square > 0, here.square, 1.0)
     slope, gram = here.slope * scale / unit, here.gram.scaled(scale / jnp.sqrt(unit))
-    least = ROUNDING * jnp.sum(gram.diagonal())
+    least = rounding(scale) * jnp.sum(gram.diagonal())
     step = -gram.plus(jnp.full(len(scale), damping + least)).solve(slope)
     return step * scale, -unit * (slope @ step + 0.5 * step @ gram.times(step))

@@ -82,7 +82,7 @@ def as_parameter(value: Any) -> Any:
     if value is None or isinstance(value, str | bytes | bool):
         raise ModelError(f"parameter value {value!r}: expected a number or one number per channel.")
     if isinstance(value, jax.Array):
-        return jnp.asarray(value, float)
+        return value if jnp.issubdtype(value.dtype, jnp.floating) else jnp.asarray(value, float)
     found = arguments.numbers("parameter value", value)
     if found.ndim > 1:
         arguments.refuse("parameter value", value, "a number or one number per channel")

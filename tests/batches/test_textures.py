@@ -173,6 +173,27 @@ def test_another_texture_takes_no_results_away(atlas: Path, tmp_path: Path) -> N
     assert len(list((out / "parts").iterdir())) == 1
 
 
+@pytest.mark.usefixtures("handler")
+def test_a_texture_of_another_precision_is_another(atlas: Path, tmp_path: Path) -> None:
+    """Tiles of one are not taken for the other's, nor is its folder; of files there is none in single precision."""
+    out = tmp_path / "out"
+    asked = ["batch", str(atlas), "--out", str(out), "--loss", "gaussian", "--fix", "ks=1", "--fix", "eta=1.5"]
+    assert CliRunner().invoke(app, [*asked, "--precision", "single"]).exit_code == 0
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    assert "12 known from an earlier run" in CliRunner().invoke(app, [*asked, "--precision", "single"]).output
+    assert "which would be lost" in str(CliRunner().invoke(app, asked).exception)
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+    single = fit_texture(atlas, tmp_path / "other", precision="single", **TOLD)
+    read, told = read_atlas(atlas), arrays()
+    direct = fm.fit_many(read.wi, read.wo, told["value"], sigma=told["sigma"], precision="single", **TOLD)
+    np.testing.assert_array_equal(single.fits.steps, direct.steps)
+    np.testing.assert_array_equal(single.fits.values, direct.values)
+    assert fit_texture(atlas, tmp_path / "other", force=True, **TOLD).earlier == 0
+    assert fit_texture(atlas, tmp_path / "other", precision="double", **TOLD).earlier == ROWS * COLUMNS
+    refused = CliRunner().invoke(app, ["batch", str(tmp_path), "--precision", "single"])
+    assert "--precision single for files, expected a texture" in str(refused.exception)
+
+
 def test_a_texture_replaces_no_file_of_the_user(atlas: Path, tmp_path: Path) -> None:
     """Nor does force, nor where what should be the record is none."""
     (tmp_path / "base_color.png").write_text("mine")

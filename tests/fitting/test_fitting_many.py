@@ -12,7 +12,7 @@ import fitmat as fm
 from fitmat.errors import FitmatError
 from fitmat.fitting.concluding import RESULTS
 from fitmat.fitting.losses import LOSSES
-from fitmat.fitting.many import tiles
+from fitmat.fitting.many import searching, tiles
 from fitmat.fitting.many.concluding import OUTCOMES, TOO_FEW
 from fitmat.fitting.many.fitting_many import shared_by_all
 from fitmat.fitting.many.gathering import gathered
@@ -190,7 +190,7 @@ def test_a_start_that_is_far_behind_is_given_up(monkeypatch: pytest.MonkeyPatch)
         ended.append((told[2][:count], Ends(*(np.asarray(part)[:count] for part in found))))
         return found
 
-    monkeypatch.setattr(tiles, "solve_many", watched)
+    monkeypatch.setattr(searching, "solve_many", watched)
     found = fm.fit_many(WI, WO, value, "lambert+ggx", sigma=sigma, loss="gaussian", threads=1)
     of, ends = ended[0]
 

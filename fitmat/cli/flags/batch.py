@@ -86,6 +86,13 @@ RunsFlag = Annotated[
     bool, typer.Option("--runs", help="Leave of each file what fit leaves too, its page among it, in runs/; slower.")
 ]
 
+PrecisionFlag = Annotated[
+    Literal["double", "single"],
+    typer.Option(
+        help="Numbers in which the optimum of a texture's points is looked for; single is faster, and ends in double."
+    ),
+]
+
 McmcFlag = Annotated[
     bool, typer.Option("--mcmc", help="Sample every posterior; slower, else intervals from Laplace's approximation.")
 ]

@@ -20,6 +20,7 @@ from fitmat.fitting.losses import loss as find_loss
 from fitmat.fitting.many.fits import Fits
 from fitmat.fitting.many.gathering import padded
 from fitmat.fitting.many.lanes import Shared
+from fitmat.fitting.many.searching import PRECISIONS, Search
 from fitmat.fitting.many.sharing import refuse_idle, sharing, told_together
 from fitmat.fitting.many.table import table
 from fitmat.fitting.many.tiles import Work, each
@@ -50,6 +51,7 @@ def fit_many(
     threads: int | None = None,
     pool: str | Sequence[str] | None = None,
     smooth: str | Sequence[str] | None = None,
+    precision: str = "double",
     progress: Progress | None = None,
 ) -> Fits:
     """Fit a model to many surfaces, or to each point of one, that were seen from the same directions.
@@ -73,6 +75,8 @@ def fit_many(
             own data leave it open, `Fits.pooled`; values and deviations stay.
         smooth: Parameters of points in rows and columns that are taken to differ little from those of their neighbours,
             but where two materials meet: `Fits.smoothed`; values and deviations stay.
+        precision: "single" looks for every optimum in float32, and only goes on from there in float64, in which noise,
+            deviations and outcomes are always judged.
         progress: Called with what is done, how many surfaces are done, and how many there are.
 
     Returns:
@@ -92,6 +96,7 @@ def fit_many(
     for name, given in (("starts", starts), ("max_steps", max_steps)):
         arguments.whole(name, given, 1)
     arguments.whole("threads", threads, 1, optional=True)
+    arguments.choice("precision", precision, PRECISIONS)
     arguments.function("progress", progress)
     asked, pair = sharing(pool, smooth), direction_pairs(wi, wo)
     numbers = _values(value, len(pair[0]))
@@ -104,7 +109,9 @@ def fit_many(
     refuse_idle(asked, shared, held, numbers.shape[:-2])
     axes, flat = numbers.shape[:-2], numbers.reshape(-1, *numbers.shape[-2:])
     noise = None if noise is None else noise.reshape(flat.shape)
-    work, count = Work(shared, table(shared, held), starts, max_steps), threads or os.cpu_count() or 1
+    known, count = table(shared, held), threads or os.cpu_count() or 1
+    search = Search(shared, known, starts, max_steps)
+    work = Work(search.rough() if precision == "single" else search)
     size = work.size(len(flat), count)
     found = each(
         lambda part: work.fitted(flat[part], None if noise is None else noise[part], size),

@@ -79,7 +79,7 @@ def from_natural(moved: Coordinates, natural: Float[Array, "k B"]) -> Charted:
 def from_unbounded(moved: Coordinates, u: Float[Array, "k B"]) -> Charted:
     """Of unbounded coordinates."""
     found, slopes = from_natural(moved, moved.natural_of(u.T).T)
-    along = moved.span[:, None] * jnp.cos(u) / 2.0
+    along = moved.span.astype(u.dtype)[:, None] * jnp.cos(u) / 2.0
     return found, [slope * turn for slope, turn in zip(slopes, along, strict=True)]
 
 
@@ -88,7 +88,8 @@ def predicted(shared: Shared, chosen: list[Array]) -> tuple[Float[Array, "n c B"
 
     def one(wi: Array, wo: Array, *moved: Array) -> list[Array]:
         def value(*numbers: Array) -> Array:
-            return jnp.broadcast_to(_model(shared, numbers)(wi, wo), (shared.channels,)) * wi[2]
+            value = jnp.asarray(_model(shared, numbers)(wi, wo), wi.dtype)  # tables of some models are of 64 bits
+            return jnp.broadcast_to(value, (shared.channels,)) * wi[2]
 
         return [value(*moved), *(_slope(value, moved, k) for k in range(len(moved)))]
 

@@ -19,8 +19,12 @@ from fitmat.maths.least_squares import RTOL, relative_offset
 from fitmat.maths.levenberg_marquardt import LevenbergMarquardt
 from fitmat.maths.programs import program_run_often
 
-TOLERANCE = 1e-2 * RTOL
-"""Of the steps: a hundredth of a single fit's, so that what is between the two is mostly that one's last step."""
+TOLERANCE = {"float64": 1e-2 * RTOL, "float32": 1e-4}
+"""Of the steps, by the type of the numbers: a hundredth of a single fit's, so that what is between the two is mostly
+that one's last step; in 32 bits what can be told from rounding."""
+
+STILL = {"float64": SETTLED, "float32": 1e-4}
+"""Relative change of the discrepancy at which the alternation ends, likewise."""
 
 PATIENCE = 24
 """Looks after which a fit is given up that is far behind another start of its surface, which has ended: on the way to a
@@ -81,9 +85,10 @@ def solve_many(
     starts: ArrayLike,
     first: ArrayLike,
     counts: ArrayLike,
+    damping: ArrayLike,
     block: int,
 ) -> tuple[Array, ...]:
-    """The fields of `Ends`.
+    """The fields of `Ends`, in numbers of the type of the starts.
 
     Args:
         shared: The model and the directions.
@@ -92,14 +97,15 @@ def solve_many(
         starts: Unbounded coordinates, (L, k).
         first: A first guess of the discrepancy, (T,).
         counts: How many of the fits are wanted, and how many looks each may take.
+        damping: The first λ, as `least_squares` has it.
         block: B.
     """
-    work = _Work(shared, samples, *(jnp.asarray(part) for part in (of, starts, first)), *jnp.asarray(counts))
-    many, k = work.starts.shape
-    numbers = jnp.zeros(many + 1)
-    none = Ends(jnp.zeros((many + 1, k)), numbers, numbers, jnp.zeros(many + 1, bool), jnp.zeros(many + 1, int))
+    work = _Work(shared, samples, *(jnp.asarray(part) for part in (of, starts, first, damping)), *jnp.asarray(counts))
+    (many, k), kind = work.starts.shape, work.starts.dtype
+    numbers = jnp.zeros(many + 1, kind)
+    none = Ends(jnp.zeros((many + 1, k), kind), numbers, numbers, jnp.zeros(many + 1, bool), jnp.zeros(many + 1, int))
     begun = work.filled(work.empty(block), jnp.ones(block, bool), jnp.array(0))
-    best = jnp.full(len(work.samples.x), -jnp.inf)
+    best = jnp.full(len(work.samples.x), -jnp.inf, kind)
     found = jax.lax.while_loop(lambda state: jnp.any(work.busy(state[0])), work.passed, (*begun, none, best))[2]
     return tuple(part[:many] for part in found)
 
@@ -112,8 +118,14 @@ class _Work(NamedTuple):
     of: Array
     starts: Array
     first: Array
+    damping: Array
     wanted: Array
     most: Array
+
+    @property
+    def kind(self) -> str:
+        """The type of the numbers."""
+        return self.starts.dtype.name
 
     @property
     def infers(self) -> bool:
@@ -136,8 +148,8 @@ class _Work(NamedTuple):
         if self.infers:
             s = self.updated(at)
             score = self.log_likelihood(at, s)
-            settled = jnp.abs(s - at.s) <= SETTLED * at.s
-            state = _begun_again(at.state, at.u, ~(settled & solved), at.state.damping)
+            settled = jnp.abs(s - at.s) <= STILL[self.kind] * at.s
+            state = self.begun_again(at.state, at.u, ~(settled & solved), at.state.damping)
             after = at._replace(s=s, measured=self.transformed(at.data, s), state=state)
         done = (settled & solved) | ~jnp.isfinite(normal.square) | (at.steps >= self.most)
         surface = self.of[jnp.minimum(at.fit, len(self.starts) - 1)]
@@ -163,13 +175,13 @@ class _Work(NamedTuple):
         normal, x = looked(
             self.shared, at.data, at.s, at.measured, lambda: from_unbounded(moved, trial), jnp.any(moving)
         )
-        bent = jnp.eye(len(trial))[:, :, None] * moved.bend(trial, normal.slope)
+        bent = jnp.eye(len(trial), dtype=trial.dtype)[:, :, None] * moved.bend(trial, normal.slope)
         seen = (
             normal._replace(gram=Whole(normal.gram.dense() + bent)),
             (x if self.infers else None),
             jnp.zeros_like(at.s),
         )
-        u, state, _ = jax.vmap(_solver().judged, in_axes=-1, out_axes=-1)(at.u, at.state, seen)
+        u, state, _ = jax.vmap(self.solver.judged, in_axes=-1, out_axes=-1)(at.u, at.state, seen)
         u, state = jax.tree.map(lambda new, old: jnp.where(moving, new, old), (u, state), (at.u, at.state))
         return at._replace(u=u, state=state, steps=at.steps + moving)
 
@@ -184,16 +196,16 @@ class _Work(NamedTuple):
         u = jnp.where(done, self.starts[safe].T, at.u)
         s = jnp.where(done, self.first[of] if self.infers else 0.0, at.s)
         steps = jnp.where(done, 0, at.steps)
-        state = _begun_again(at.state, u, done, 1.0)
+        state = self.begun_again(at.state, u, done, self.damping)
         return _Block(fit, data, self.transformed(data, s), u, state, s, steps), following + jnp.sum(done)
 
     def empty(self, block: int) -> _Block:
         """A block without fits."""
-        k, (n, c) = self.starts.shape[1], self.samples.x.shape[1:]
-        data = jax.tree.map(lambda part: jnp.ones((*jnp.shape(part)[1:], block)), self.samples)
-        zero, x = jnp.zeros(block), jnp.zeros((n, c, block))
-        normal = Normal(zero, jnp.zeros((k, block)), Whole(jnp.zeros((k, k, block))))
-        state = jax.vmap(lambda u, here: _solver().init(None, u, None, None, None, here, None), -1, -1)(
+        k, (n, c), kind = self.starts.shape[1], self.samples.x.shape[1:], self.starts.dtype
+        data = jax.tree.map(lambda part: jnp.ones((*jnp.shape(part)[1:], block), kind), self.samples)
+        zero, x = jnp.zeros(block, kind), jnp.zeros((n, c, block), kind)
+        normal = Normal(zero, jnp.zeros((k, block), kind), Whole(jnp.zeros((k, k, block), kind)))
+        state = jax.vmap(lambda u, here: self.solver.init(None, u, None, None, None, here, None), -1, -1)(
             normal.slope, (normal, x if self.infers else None, zero)
         )
         nothing = jnp.full(block, len(self.starts))
@@ -222,13 +234,13 @@ class _Work(NamedTuple):
         terms = log_pointwise(at.state.here[1], at.data.noise, self.shared.data(at.data), s)
         return summed(at.data.weight * terms)
 
+    @property
+    def solver(self) -> LevenbergMarquardt:
+        tolerance = TOLERANCE[self.kind]
+        return LevenbergMarquardt(rtol=tolerance, atol=tolerance, limit=None)
 
-def _solver() -> LevenbergMarquardt:
-    return LevenbergMarquardt(rtol=TOLERANCE, atol=TOLERANCE, limit=None)
-
-
-def _begun_again(state: Any, u: Array, which: Bool[Array, " B"], damping: Any) -> Any:
-    """Levenberg–Marquardt from its beginning at u, in some lanes."""
-    new = jax.vmap(lambda u, here: _solver().init(None, u, None, None, None, here, None), -1, -1)(u, state.here)
-    new = type(state)(*(damping if name == "damping" else getattr(new, name) for name in new.__dataclass_fields__))
-    return jax.tree.map(lambda begun, old: jnp.where(which, begun, old), new, state)
+    def begun_again(self, state: Any, u: Array, which: Bool[Array, " B"], damping: Any) -> Any:
+        """Levenberg–Marquardt from its beginning at u, in some lanes."""
+        new = jax.vmap(lambda u, here: self.solver.init(None, u, None, None, None, here, None), -1, -1)(u, state.here)
+        new = type(state)(*(damping if name == "damping" else getattr(new, name) for name in new.__dataclass_fields__))
+        return jax.tree.map(lambda begun, old: jnp.where(which, begun, old), new, state)

@@ -90,7 +90,7 @@ def tint(base: Spectrum) -> Spectrum:
     """
     if jnp.size(base) == 1:
         return jnp.ones_like(base)
-    luminance = _LUMINANCE @ base if jnp.size(base) == 3 else jnp.mean(base)
+    luminance = _LUMINANCE.astype(base.dtype) @ base if jnp.size(base) == 3 else jnp.mean(base)
     coloured = luminance > BLACK
     return jnp.where(coloured, base / jnp.where(coloured, luminance, 1.0), 1.0)
 
