@@ -34,6 +34,10 @@ START = {"kd": 0.45, "ks": 0.7, "alpha": 0.28, "eta": 1.9}
 """27 to 50 % away from the truth."""
 
 INCIDENCES = {500: 5, 100_000: 100}
+OURS, PEER, HOISTED = "fitmat, one start", "scipy lm, one start", "scipy lm, geometry hoisted"
+WHOLE, PASS = "fitmat.fit, whole", "one pass"
+"""The rivals, and what stands beside them."""
+
 SAME = 1e-5
 """Largest relative difference of the parameters that two converged fits may have."""
 
@@ -121,8 +125,8 @@ def main() -> None:
         race(rows, chosen.repeats, whole=not chosen.no_whole)
 
 
-def race(rows: int, repeats: int, *, whole: bool) -> None:
-    """Both fits of `rows` samples, in turn."""
+def race(rows: int, repeats: int, *, whole: bool) -> dict[str, np.ndarray]:
+    """Both fits of `rows` samples, in turn: seconds of each rival, (repeats,)."""
     m = measured(rows)
     data = prepare(m, measured_noise(m))
     s = first_discrepancy(data)
@@ -140,15 +144,14 @@ def race(rows: int, repeats: int, *, whole: bool) -> None:
     print("scipy lm    " + "  ".join(f"{v:.10g}" for v in found[1]))
     print(f"largest relative difference {difference:.1e}")
     assert difference < SAME, "the two fits do not agree: no race"
-    names = ("fitmat, one start", "scipy lm, one start", "scipy lm, geometry hoisted", "fitmat.fit, whole", "one pass")
-    rivals: dict[str, Callable[[], object]] = {names[0]: one, names[1]: other, names[2]: hoisted}
+    rivals: dict[str, Callable[[], object]] = {OURS: one, PEER: other, HOISTED: hoisted}
     evaluations = f"{solution.nfev} steps, {solution.calls} evaluations"
-    work = {names[0]: f"{int(end.steps)} iterations", names[1]: evaluations, names[2]: evaluations}
-    rivals[names[4]], work[names[4]] = one_pass(data, s), "residuals, Jacobian and JᵀJ of all rows"
+    work = {OURS: f"{int(end.steps)} iterations", PEER: evaluations, HOISTED: evaluations}
+    rivals[PASS], work[PASS] = one_pass(data, s), "residuals, Jacobian and JᵀJ of all rows"
     if whole:
         fitted = fm.fit(m, "lambert+ggx")
-        rivals[names[3]] = lambda: fm.fit(m, "lambert+ggx")
-        work[names[3]] = f"{fitted.n_starts} starts, best {fitted.steps} iterations, {fitted.result}"
+        rivals[WHOLE] = lambda: fm.fit(m, "lambert+ggx")
+        work[WHOLE] = f"{fitted.n_starts} starts, best {fitted.steps} iterations, {fitted.result}"
     seconds = machine.interleaved(rivals, repeats)
     median = {name: float(np.median(taken)) for name, taken in seconds.items()}
     machine.show(
@@ -156,10 +159,11 @@ def race(rows: int, repeats: int, *, whole: bool) -> None:
         ["", "median", "fastest", "scipy takes", "work"],
         [
             [name, machine.duration(median[name]), machine.duration(seconds[name].min()),
-             f"{median[names[1]] / median[name]:.2f} ×", work[name]]
+             f"{median[PEER] / median[name]:.2f} ×", work[name]]
             for name in rivals
         ],
     )  # fmt: skip
+    return seconds
 
 
 if __name__ == "__main__":

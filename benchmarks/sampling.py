@@ -106,20 +106,25 @@ def main() -> None:
     chosen = options.parse_args()
     jax.config.update("jax_enable_x64", True)
     print(machine.described(), "\n")
-    m = fits.measured(chosen.rows)
+    race(chosen.rows, chosen.repeats, chosen.steps)
+
+
+def race(rows: int, repeats: int, steps: int) -> dict[str, float]:
+    """All of them in turn: effective draws a second, medians."""
+    m = fits.measured(rows)
     found, peer = fm.fit(m, "lambert+ggx"), fits.problem(m, hoisted=True)
     check_density(found, peer)
     fitmats(found, 0)
     names = ("fitmat.sample", "user", "batched", "exchanged")
     runs: dict[str, list[Run]] = {name: [] for name in names}
-    for seed in range(1, chosen.repeats + 1):
+    for seed in range(1, repeats + 1):
         runs["fitmat.sample"].append(fitmats(found, seed))
-        runs["user"].append(users(found, seed, peer, chosen.steps, vectorize=False))
-        runs["batched"].append(users(found, seed, peer, chosen.steps, vectorize=True))
+        runs["user"].append(users(found, seed, peer, steps, vectorize=False))
+        runs["batched"].append(users(found, seed, peer, steps, vectorize=True))
         runs["exchanged"].append(exchanged(found, seed, peer))
     for name in names[1:]:
         agree(runs["fitmat.sample"][0], runs[name][0])
-    report(m.n_samples, runs)
+    return report(m.n_samples, runs)
 
 
 def check_density(found: fm.Fit, peer: Problem) -> None:
@@ -132,8 +137,8 @@ def check_density(found: fm.Fit, peer: Problem) -> None:
     assert max(difference, singly) < 1e-6, "the two likelihoods differ"
 
 
-def report(rows: int, runs: dict[str, list[Run]]) -> None:
-    """Posterior means side by side, then the speeds."""
+def report(rows: int, runs: dict[str, list[Run]]) -> dict[str, float]:
+    """Posterior means side by side, then the speeds, which are returned: effective draws a second, medians."""
     cells = [
         [name, *(f"{mean:.4f} ± {sd:.4f}" for mean, sd in zip(r.draws.mean(axis=0), r.draws.std(axis=0), strict=True))]
         for name, (r, *_) in runs.items()
@@ -150,6 +155,7 @@ def report(rows: int, runs: dict[str, list[Run]]) -> None:
         )  # fmt: skip
     headings = ["", "wall", "steps", "effective draws", "a second", "fitmat is faster"]
     machine.show(f"{rows} rows, medians of {len(runs['user'])}", headings, lines)
+    return rate
 
 
 if __name__ == "__main__":

@@ -84,6 +84,21 @@ def peers(wi: np.ndarray, wo: np.ndarray, value: np.ndarray, sigma: np.ndarray) 
         return len(value) / (time.perf_counter() - begin), found
 
 
+def raced(
+    precisions: Sequence[str], repeats: int, **told: Any
+) -> tuple[dict[str, list[float]], dict[str, list[float]], dict[str, fm.Fits]]:
+    """Wall and CPU seconds of each warm run in turn, and what was found, by precision."""
+    fits = {name: fm.fit_many(**told, precision=name) for name in precisions}
+    taken, busy = ({name: [] for name in precisions} for _ in range(2))
+    for _ in range(repeats):
+        for name in precisions:
+            begin = time.process_time()
+            seconds, fits[name] = machine.clocked(lambda name=name: fm.fit_many(**told, precision=name))
+            taken[name].append(seconds)
+            busy[name].append(time.process_time() - begin)
+    return taken, busy, fits
+
+
 def main() -> None:
     """Time, check and print."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -118,14 +133,7 @@ def main() -> None:
 
 def timed(rows: list[list[str]], what: str, precisions: Sequence[str], repeats: int, **told: Any) -> fm.Fits:
     """A row for each precision, and of all but the first how far it ends from the first, whose fits are returned."""
-    fits = {name: fm.fit_many(**told, precision=name) for name in precisions}
-    taken, busy = ({name: [] for name in precisions} for _ in range(2))
-    for _ in range(repeats):
-        for name in precisions:
-            begin = time.process_time()
-            seconds, fits[name] = machine.clocked(lambda name=name: fm.fit_many(**told, precision=name))
-            taken[name].append(seconds)
-            busy[name].append(time.process_time() - begin)
+    taken, busy, fits = raced(precisions, repeats, **told)
     peak, first = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, precisions[0]
     for name, one in fits.items():
         count = one.outcome.size
