@@ -75,10 +75,10 @@ def _log_weights(
         rank = np.argsort(tail, axis=1)
         places, tail = (np.take_along_axis(part, rank, axis=1) for part in (places, tail))
         shape, scale = _generalised_pareto(np.exp(tail) - cutoff)
-        fitted = np.isfinite(shape) & np.isfinite(scale) & (tail[:, -1] > tail[:, 0])
+        fitted = np.isfinite(shape) & np.isfinite(scale) & (scale > 0.0) & (tail[:, -1] > tail[:, 0])
         k[fitted] = shape[fitted]
         values = cutoff[fitted] + _quantiles(count, shape[fitted, None], scale[fitted, None])
-        # No weight is larger than the largest ratio.
+        # No weight is larger than the largest ratio, as a quantile beyond all numbers would be.
         smooth = np.minimum(np.log(values), 0.0)
         found[np.flatnonzero(fitted)[:, None], places[fitted]] = smooth
     found -= _log_sum(found)[:, None]
@@ -120,7 +120,8 @@ def _quantiles(
     """Quantiles of the generalised Pareto distribution at (z − ½)/M, z = 1 … M: σ ((1 − p)^(−k) − 1)/k (PSIS)."""
     log_survival = np.log1p(-(np.arange(count) + 0.5) / count)
     curved = np.where(shape == 0.0, 1.0, shape)
-    return scale * np.where(shape == 0.0, -log_survival, np.expm1(-curved * log_survival) / curved)
+    with np.errstate(over="ignore"):  # of a few draws that outweigh all others
+        return scale * np.where(shape == 0.0, -log_survival, np.expm1(-curved * log_survival) / curved)
 
 
 def _log_sum(logs: Float[np.ndarray, "n m"]) -> Float[np.ndarray, " n"]:

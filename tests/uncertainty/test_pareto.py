@@ -32,6 +32,19 @@ def test_weights_and_shape_are_those_of_arviz(count: int, scale: float) -> None:
     np.testing.assert_allclose(weights.sum(axis=-1), 1.0, rtol=1e-12)
 
 
+@pytest.mark.parametrize("top", [-500.0, -690.0])
+def test_a_tail_of_hundreds_of_decades_is_weighed(top: float) -> None:
+    """The quantiles of its distribution are beyond all numbers; weights end at the largest ratio, as arviz has it."""
+    logs = np.r_[np.linspace(-2000.0, -1000.0, 3800), np.linspace(top, 0.0, 200)]
+    weights, k = smoothed(logs)
+    with np.errstate(over="ignore"):
+        expected, shape = array_stats.psislw(-logs)
+    assert float(k) == pytest.approx(float(shape), rel=ROUNDING)
+    assert k > 100.0
+    assert weights.sum() == pytest.approx(1.0, rel=1e-12)
+    np.testing.assert_allclose(weights, np.exp(expected), rtol=0, atol=ROUNDING)
+
+
 @pytest.mark.parametrize("r_eff", [1.0, 0.5, 0.225, 0.01])
 def test_left_out_densities_are_those_of_arviz(r_eff: float) -> None:
     """Of values that hardly matter and of some that decide; correlated draws have a longer tail."""
