@@ -180,6 +180,27 @@ def test_what_is_touched_changes_what_it_should(studied, chromium, monkeypatch) 
     assert (seen["reachable"], seen["nameless"]) == (0, 0)
 
 
+ANYWHERE = """
+  seen.scales = [];
+  for (const yRange of [[0.0097, 0.5], [0.0043, 0.9], [0.00976, 3], [0.0123, 40], [0.3, 2]]) {
+    const place = document.body.appendChild(document.createElement("div"));
+    const series = [{label: "a", values: [0.4, 0.5, 0.45], colour: "#112233"}];
+    const chart = fitmat.chart(place, {x: [0, 1, 2], series, yScale: "log", xRange: [0, 2], yRange, label: "x"});
+    await settled();
+    seen.scales.push(chart.axes[1]._values.filter(Boolean));
+  }
+"""
+
+
+@pytest.mark.study
+def test_logarithmic_scales_begin_anywhere(studied, chromium, monkeypatch) -> None:
+    """The ticks of the library never ended where a scale does not begin at a power of ten."""
+    seen = look(html_of(studied), chromium, ANYWHERE, monkeypatch, "--window-size=1280,900")
+    assert seen["wrong"] == []
+    assert seen["scales"][0] == ["0.01", "0.02", "0.05", "0.1", "0.2", "0.5"]
+    assert seen["scales"][3] == ["0.1", "1", "10"]
+
+
 TOLD_APART = """
   const models = fitmat.data.figures.models;
   seen.dashes = models.map(name => String(fitmat.modelDash(name)));

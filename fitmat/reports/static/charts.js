@@ -29,7 +29,7 @@ fitmat.chart = (place, options) => {
     scales: {x: {time: false, range: (u, min, max) => options.zoom && options.zoom() || options.xRange},
              y: {...distribution[options.yScale || "linear"], range: () => options.yRange}},
     axes: [{...axis, label: options.xLabel, size: 30, values: (u, splits) => splits.map(v => v + "°"), splits: degrees},
-           {...axis, label: options.yLabel, size: 56, splits: options.ySplits ? (u, axis, min, max) => options.ySplits.filter(v => v >= min && v <= max) : options.yScale === "cube root" ? evenly : undefined,
+           {...axis, label: options.yLabel, size: 56, splits: options.ySplits ? (u, axis, min, max) => options.ySplits.filter(v => v >= min && v <= max) : options.yScale === "cube root" ? evenly : log ? powers : undefined, filter: (u, splits) => splits,
             values: (u, splits) => splits.map(v => v === null || log && !told(v) ? "" : short(v))}],
     cursor: {drag: {x: Boolean(options.zoomed), y: false, setScale: false}, y: false, points: {show: false}},
     hooks: {
@@ -66,6 +66,13 @@ fitmat.chart = (place, options) => {
     const found = [];
     for (let v = Math.ceil(min / step) * step; v <= max; v += step) found.push(v);
     return found;
+  }
+  /* 1 to 9 times powers of ten: uPlot's own never end where a scale does not begin at one of them. */
+  function powers(u, axis, min, max) {
+    const found = [];
+    for (let power = Math.floor(Math.log10(min)); power <= Math.log10(max); power++)
+      for (let lead = 1; lead < 10; lead++) found.push(Number(`${lead}e${power}`));
+    return found.filter(v => v >= min && v <= max);
   }
   function evenly(u, axis, min, max) {
     const low = Math.cbrt(min), high = Math.cbrt(max), found = [];
