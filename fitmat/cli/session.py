@@ -40,7 +40,6 @@ class Watch:
     the next step, so that what was done is kept; a second one, and any other, is as before.
 
     Attributes:
-        done: How far the stage is.
         most: How far any stage was.
     """
 
@@ -50,7 +49,7 @@ class Watch:
         self._bar: Progress | None = None
         self._task = TaskID(0)
         self._before: Any = None
-        self._asked, self.done, self.most = False, 0, 0
+        self._asked, self.most = False, 0
 
     def open(self, what: str) -> None:
         """Show that something is going on, at a terminal only, before there is a stage."""
@@ -67,11 +66,11 @@ class Watch:
 
     def __call__(self, what: str, done: int, total: int) -> None:
         """Show the stage; stop where that was asked for."""
-        self.done, self.most = done, max(self.most, done)
+        self.most = max(self.most, done)
         what = visible(what)
         sampling = what.startswith(SAMPLING)
         if what != self._stage:
-            self._begin(what, sampling)
+            self._begin(what, done, sampling)
         if self._bar is not None:
             self._bar.update(self._task, completed=done, total=total or None)
         elif total and time.monotonic() - self._said > EVERY:
@@ -95,11 +94,11 @@ class Watch:
             self._told.add(words)
             self._say(words)
 
-    def _begin(self, what: str, sampling: bool) -> None:
+    def _begin(self, what: str, done: int, sampling: bool) -> None:
         goes_on = what.partition(",")[0] == self._stage.partition(",")[0]
         self._stage = what
         if not goes_on:
-            self._since = time.monotonic(), self.done
+            self._since = time.monotonic(), done
         if self._bar is not None and goes_on:
             self._bar.update(self._task, description=what, refresh=True)
         elif self._bar is not None:

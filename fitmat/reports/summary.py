@@ -3,13 +3,14 @@
 It computes nothing: its rows are those of the table.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 from markupsafe import Markup
 
 from fitmat.reports.rendering import CHART_STYLES, CHARTS, LICENCE, POLICY, digest, embedded, environment, static
+from fitmat.studies.numbers import short
 from fitmat.text import visible_in
 
 SCRIPTS = (CHARTS, "summary.js", "scatter.js")
@@ -59,14 +60,10 @@ def to_html(
 def _drawn(files: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Columns that can be drawn, their numbers file by file, the names of the files, and what is drawn at first."""
     names = list(dict.fromkeys(name for one in files for name in one["columns"]))
-    whole = {name: [_number(one["columns"].get(name)) for one in files] for name in names}
+    whole = {name: short([one["columns"].get(name, np.nan) for one in files], DIGITS) for name in names}
     ends = {f"{name}{end}" for name in whole for end in ("_low", "_high")}
     offered = [name for name, cells in whole.items() if name not in ends and len(set(cells) - {None}) > 1]
     columns = {name: cells for name, cells in whole.items() if name in ends or name in offered}
     first = [next((name for name in (*some, *offered[k:]) if name in offered), "") for k, some in enumerate(FIRST)]
     names = [one["name"] for one in files]
     return visible_in({"names": names, "columns": columns, "offered": offered, "first": first})
-
-
-def _number(cell: float | None) -> float | None:
-    return None if cell is None or not math.isfinite(cell) else float(f"{cell:.{DIGITS}g}")
